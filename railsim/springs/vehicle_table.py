@@ -82,20 +82,12 @@ def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> 
 
 
 def vehicle_text(
-    suspension: TrailingArmSuspension,
-    part: VehiclePart,
-    extends: str | None = None,
-    remove: Sequence[str] | None = None,
+    suspension: TrailingArmSuspension, part: VehiclePart, extends: str, remove: Sequence[str]
 ) -> str:
     """Return the text of a vehicle file that replaces the primary suspension of another one.
 
-    File and parts to remove are by default those of the table `[vehicle]`.
+    File and parts to remove are those of `base_of`.
     """
-    table = suspension.vehicle
-    if table is None:
-        raise ValueError("the suspension has no vehicle table")
-    extends = table.extends if extends is None else extends
-    remove = table.remove if remove is None else remove
     name = f"{Path(extends).stem} on {suspension.name}"
     head: dict[str, Any] = {"format": "railsim-vehicle/1", "name": name, "extends": extends}
     if suspension.source is not None:
@@ -117,16 +109,17 @@ def vehicle_text(
 
 
 def base_of(
-    suspension: TrailingArmSuspension, extends: str | None, folder: str | Path
-) -> tuple[str | None, list[str] | None, list[str]]:
-    """Return another vehicle to extend and what to remove there, for `vehicle_text`, and remarks.
+    suspension: TrailingArmSuspension, extends: str | None = None, folder: str | Path = ""
+) -> tuple[str, Sequence[str], list[str]]:
+    """Return the vehicle to extend and what to remove there, for `vehicle_text`, and remarks.
 
     `extends`: file or name of a shipped one, None for that of the table `[vehicle]`; `folder`: of
     the file that is written, from which its path counts.
     """
     table = suspension.vehicle
-    if extends is None or table is None:
-        return None, None, []
+    assert table is not None  # `vehicle_part` refuses a suspension without
+    if extends is None:
+        return table.extends, table.remove, []
     data = read_source(find_file(extends, "vehicle"), "vehicle").data
     removed = [key for key in table.remove if _holds(data, key)]
     beside = []

@@ -17,7 +17,7 @@ from railsim.springs.datasheet import data_sheets
 from railsim.springs.design import design
 from railsim.springs.nests import Dimensions, evaluate
 from railsim.springs.summary import coils_by_wire
-from railsim.springs.vehicle_table import vehicle_part, vehicle_text
+from railsim.springs.vehicle_table import base_of, vehicle_part, vehicle_text
 from railsim.springs.verification import fatigue, load_cases, verify
 
 CHANGES = [
@@ -248,7 +248,7 @@ def test_a_vehicle_file_says_which_spring_it_leaves_out():
     own = load_spring("turasas_axlebox", ["inner.engagement=0.12"])
     part = vehicle_part(own)
     (remark,) = [said for said in part.remarks if "inner spring" in said]
-    assert f"# {remark}\n" in vehicle_text(own, part)
+    assert f"# {remark}\n" in vehicle_text(own, part, *base_of(own)[:2])
     vertical = part.elements["coil_nest"]["stiffness"][2]
     assert vertical == pytest.approx(78.48e9 * 0.041**4 / (8.0 * 3.6 * 0.23**3), rel=1e-6)
 
