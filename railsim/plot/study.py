@@ -74,7 +74,7 @@ def curves_figure(
     _name_medians(figure, points, "; bands from the smallest to the largest")
     for axes, quantity in zip(cells, quantities, strict=True):
         for member, colour in zip(members, colours, strict=True):
-            own = None if family is None else [value == member for value in family.values]
+            own = [value == member for value in others]
             _curve(axes, quantity, x, own, colour, member)
         for value, abscissa, crossed in zip(quantity.values, x.values, early, strict=False):
             if crossed and None not in (value, abscissa):
@@ -105,7 +105,7 @@ def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, memb
     different = x.different
     there: dict[int, list[float]] = {}
     for i, (value, abscissa) in enumerate(zip(quantity.values, x.values, strict=True)):
-        if value is not None and abscissa is not None and (mask is None or mask[i]):
+        if value is not None and abscissa is not None and mask[i]:
             there.setdefault(different.index(abscissa), []).append(value)
     if not there:
         return
