@@ -9,6 +9,7 @@ a quantity stand against limits.  Values of sections in which a channel has a ga
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -203,8 +204,11 @@ class _Channel:
     unknown: Flags  # gaps of the measurement
 
 
-_Place = tuple[list[_Channel], list[Signal]]
-"""A quantity at one place of the vehicle: what it is formed of; measured and simulated."""
+class _Place(NamedTuple):
+    """A quantity at one place of the vehicle: what it is formed of, measured and simulated."""
+
+    channels: list[_Channel]
+    both: list[Signal]
 
 
 @dataclass(eq=False)
@@ -333,7 +337,7 @@ class _Run:
             sources = [[c.measured for c in used], [c.simulated for c in used]]
             formed = [_formed(quantity, self.measurement.rate, x, side) for x in sources]
             both = [Signal(x[:, None], s[:, None], [(label, side)]) for x in formed]
-            found.append((used, both))
+            found.append(_Place(used, both))
         return found
 
     def _in_section(self, quantity: Compared, section: TestSection, place: _Place) -> list[Pair]:

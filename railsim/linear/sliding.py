@@ -8,6 +8,7 @@ speed is that at rest.
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +23,11 @@ from railsim.model.assembly import Model
 SMALLEST = 1.0 / 256.0  # part of the way between two states at which a path ends
 
 
-Grip = tuple[Floats, Floats]
-"""Deflections of all pads in a state [m], and the forces that they have there [N]."""
+class Grip(NamedTuple):
+    """Deflections of all pads in a state [m], and the forces that they have there [N]."""
+
+    deflection: Floats
+    force: Floats
 
 
 class Sliding(SteadyRolling):
@@ -72,7 +76,7 @@ class Sliding(SteadyRolling):
     def grip(self, state: Floats) -> Grip:
         """Deflections and forces of the pads in a state."""
         self.evaluate(state)
-        return self.deflection(), state[self._first + self._pads].copy()
+        return Grip(self.deflection(), state[self._first + self._pads].copy())
 
 
 Placed = Callable[[float, Floats], tuple[System, Floats]]

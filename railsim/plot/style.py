@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -122,8 +122,12 @@ def wheelset_looks(names: Sequence[str]) -> dict[str, dict[str, Any]]:
     return looks
 
 
-Span = tuple[Section, float, float]
-"""A section of the track, its begin and end on the axis of a picture, in the axis's unit."""
+class Span(NamedTuple):
+    """A section of the track on the axis of a picture, in the axis's unit."""
+
+    section: Section
+    low: float
+    high: float
 
 
 def spans(sections: Sequence[Section], distance: Floats, axis: Floats) -> list[Span]:
@@ -138,7 +142,7 @@ def spans(sections: Sequence[Section], distance: Floats, axis: Floats) -> list[S
         start, end = np.clip([section.begin, section.end], distance[0], distance[-1])
         if section.type in SHADES and start < end:
             low, high = np.interp([start, end], distance, axis)
-            found.append((section, float(low), float(high)))
+            found.append(Span(section, float(low), float(high)))
     return found
 
 
