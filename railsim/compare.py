@@ -32,12 +32,16 @@ class Comparison:
     quantity: Quantity  # what is compared
     where: str  # ``peak``, ``largest`` or ``smallest`` of the run, or ``full curve 1, median``
     peaks: Mapping[str, Peak]  # the value of every result that has it, by the result's label
+    first: str  # label of the result with which the others are compared
 
     @property
     def differences(self) -> dict[str, float]:
-        """Relative difference of every magnitude from the first; nan where that is shown as 0."""
+        """Relative difference of every magnitude from the first; nan where that is shown as 0.
+
+        And where the first has no value.
+        """
         sizes = {label: abs(peak.value) for label, peak in self.peaks.items()}
-        first = next(iter(sizes.values()))
+        first = sizes.get(self.first, 0.0)
         zero = first * self.quantity.scale <= 0.5 * self.quantity.least
         return {n: nan if zero else (size - first) / first for n, size in sizes.items()}
 
@@ -54,8 +58,8 @@ class Comparison:
 def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
     """Compare the peaks and the full-curve values of results, by what they are called.
 
-    The first is what the others are compared with.  Returns: peaks first, then the medians over
-    every full curve that the first result passed, by its number along the track.
+    The first is what the others are compared with; what it lacks has no differences.  Returns:
+    peaks first, then the medians over every full curve, by its number along the track.
     """
     rows: dict[tuple[str, str], dict[str, Peak]] = {}
     for label, result in results.items():
@@ -74,9 +78,8 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
         if not len(result["time"])
     ).check()
     return tuple(
-        Comparison(found[first].quantity, where, found)
+        Comparison(next(iter(found.values())).quantity, where, found, first)
         for (where, _), found in rows.items()
-        if first in found
     )
 
 
@@ -227,8 +230,8 @@ def _shared(positions: Floats, others: Floats) -> Any:
 
 def comparison_table(rows: Sequence[Comparison]) -> Table:
     """Return comparisons with one line for each value, SI."""
-    names = ("quantity", "unit", "where", "result", "value", "wheelset", "side", "time",
-             "distance", "difference")  # fmt: skip
+    names = ("quantity", "unit", "where", "result", "value", "wheelset", "side", *PLACE,
+             "difference")  # fmt: skip
     lines = []
     for row in rows:
         values = row.record()["values"].items()

@@ -3,11 +3,12 @@
 import json
 
 import pytest
+from example_result import example_result
 
 import railsim
 from railsim.cli import main
 from railsim.result.extremes import peak
-from railsim.simulation.check_step import FULL, HALF, half_step, step_differences
+from railsim.simulation.check_step import FULL, HALF, difference_record, half_step, step_differences
 
 SHORT = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "10"]
 
@@ -56,3 +57,11 @@ def test_half_a_step_that_is_converged_changes_nothing():
             # order four at 0.25 ms: far below the printed digits
             assert row.differences[FULL] == pytest.approx(0.0, abs=1e-6)
             assert row.differences[HALF] == 0.0
+
+
+def test_a_curve_that_one_of_both_runs_does_not_reach_is_left_out():
+    """The shorter run ends before the middle of the curve: no median there, in either order."""
+    whole, short = example_result(), example_result(duration=19.0)
+    for pair in ((whole, short), (short, whole)):
+        records = [difference_record(row) for row in step_differences(*pair)]
+        assert {record["where"] for record in records} == {"peak", "largest", "smallest"}

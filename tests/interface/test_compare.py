@@ -63,6 +63,15 @@ def test_a_run_that_begins_after_a_curve_is_compared_in_the_others():
             assert set(row.peaks) == ({"whole", "later"} if middle == 156.0 else {"whole"})
 
 
+def test_what_the_first_result_lacks_is_shown_without_a_difference():
+    made = example_result()
+    few = selected(made, quantities=["Q", "Y"])
+    lacking = {row.quantity.name: row for row in compare({"few": few, "all": made})}
+    assert {"Q", "sum_Y", "wheelset_yaw"} <= set(lacking)
+    assert lacking["sum_Y"].record()["values"]["all"]["difference"] is None
+    assert lacking["Q"].differences["all"] == pytest.approx(0.0, abs=1e-3)
+
+
 def changed(made, attributes=None, **arrays):
     """Return a result with other arrays or attributes."""
     given = {name: made[name] for name in made} | arrays
