@@ -244,10 +244,13 @@ class Table:
         return [dict(zip(names, map(_plain, row), strict=True)) for row in self.rows]
 
     def csv(self) -> str:
-        """Return comma-separated values in SI units, under the columns' names."""
+        """Return comma-separated values in SI units, under the columns' names with these."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(column.name for column in self.columns)
+        units = {"": "", "1": ""}
+        writer.writerow(
+            column.name + units.get(unit := column.si_unit, f" ({unit})") for column in self.columns
+        )
         for record in self.records():
             writer.writerow(map(spreadsheet_cell, record.values()))
         return text.getvalue()

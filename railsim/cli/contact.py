@@ -98,7 +98,7 @@ def command(
     by_side = {"wheel": wheel, "rail": rail, "radius": radii}
     _check(by_side, numbers, gauges or ())
     if creep and not 0.0 < friction <= 1.0:
-        raise input_error("--friction", f"{friction:g}", "above 0, at most 1")
+        raise input_error("--friction", f"found {friction:.12g}", "above 0, at most 1")
     if gauges and len(gauges) == 1:
         raise click.UsageError("--gauges needs two gauges at least")
     cli.goes_with("--out", output.folder, "overlay")
@@ -147,7 +147,7 @@ def _check(
         for value in further[name] if name in further else [numbers[name]]:
             if not low <= value <= high:
                 option, allowed = name.replace("_", "-"), f"{low:g} to {high:g} {unit}"
-                faults.append(Fault(f"--{option}", "", f"found {value:g}", allowed))
+                faults.append(Fault(f"--{option}", "", f"found {value:.12g}", allowed))
     faults.check()
 
 
@@ -225,14 +225,15 @@ def _write_creep(output: cli.Output, patch: "Patch", rows: Sequence[dict[str, An
     from railsim.contact.creep import LAWS
     from railsim.contact.creep_curves import CASES, exact_force
     from railsim.plot.creep import creep_curves_figure, traction_figure
-    from railsim.table import Table
+    from railsim.table import Column, Table
 
     fields = {
         case: exact_force(patch, FIELD_SIZE * patch.unit_creepages(direction))
         for case, direction in CASES.items()
     }
     figures = (creep_curves_figure(patch, LAWS), traction_figure(fields, patch.mu * patch.N))
-    for name, content in zip(CREEP, (*figures, Table(list(rows[0]), rows)), strict=True):
+    columns = [Column(name, unit="1/m" if name == "phi" else "") for name in rows[0]]
+    for name, content in zip(CREEP, (*figures, Table(columns, rows)), strict=True):
         output.write(name, content)
 
 

@@ -63,7 +63,8 @@ def printed_conicity(found: ContactSummary) -> Table:
 def conicity_map_table(found: ContactSummary, gauges: Sequence[float], values: Floats) -> Table:
     """Return the equivalent conicity, float64[gauge, amplitude], of whole millimetres by gauge."""
     whole = range(1, len(found.amplitudes), 2)
-    columns = [Column(f"{1e3 * found.amplitudes[k]:.0f} mm", format=".3f") for k in whole]
+    sizes = [f"{1e3 * found.amplitudes[k]:.0f} mm" for k in whole]
+    columns = [Column(f"amplitude {size}", size, format=".3f") for size in sizes]
     rows = [[gauge, *row[1::2]] for gauge, row in zip(gauges, values, strict=True)]
     title = "Equivalent conicity over gauge and amplitude"
     return Table([Column("gauge", unit="mm", format=".1f"), *columns], rows, title)

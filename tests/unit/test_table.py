@@ -93,7 +93,7 @@ def test_programs_get_plain_values():
     assert data[0] == {"wheel": WHEEL, "verdict": "pass", "Q": 89123.4, "n": 3}
     assert data[1] == {"wheel": "trailing", "verdict": "fail", "Q": None, "n": 4}
     rows = list(csv.reader(io.StringIO(PEAKS.csv())))
-    assert rows[0] == ["wheel", "verdict", "Q", "n"]
+    assert rows[0] == ["wheel", "verdict", "Q (N)", "n"]
     assert float(rows[1][2]) == 89123.4
     formula = Table(["name"], [["=1+1"]]).csv()
     assert formula == "name\n'=1+1\n"
