@@ -114,7 +114,7 @@ def _ranges(
     found = {name: values for name, values in found.items() if values}
     for mu in found.get("friction", ()):  # 0,4 is two values
         if not 0.0 <= mu <= 2.0:
-            raise input_error("--friction", f"found {mu:g}", "0 to 2, such as 0.4")
+            raise input_error("--friction", f"found {mu:.12g}", "0 to 2, such as 0.4")
     for text in over:
         key, equals, values = text.partition("=")
         if not equals:

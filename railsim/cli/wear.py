@@ -205,13 +205,13 @@ def _file_name(of: Worn, amount: float, side: str) -> str:
 
 def _number_of_steps(of: Worn, distance: float, step: float) -> int:
     Faults(
-        Fault(option, "", f"found {value:g}", "above 0")
+        Fault(option, "", f"found {value:.12g}", "above 0")
         for option, value in ((f"--{of.amount}", distance), ("--step", step))
         if not 0.0 < value < float("inf")
     ).check()
     steps = round(min(distance / step, MOST_STEPS + 1.0))
     if not 1 <= steps <= MOST_STEPS or abs(steps * step - distance) > 1e-9 * distance:
-        found = f"found {step:g} {of.unit} with a {of.amount} of {distance:g} {of.unit}"
+        found = f"found {step:.12g} {of.unit} with a {of.amount} of {distance:.12g} {of.unit}"
         allowed = f"the {of.amount} divided by a whole number from 1 to {MOST_STEPS}"
         raise input_error("--step", found, allowed)
     return steps

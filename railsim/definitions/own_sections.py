@@ -44,10 +44,11 @@ class OwnSections(FileDefinition):
     def contradictions(self) -> list[Fault]:
         """Return sections too short for means over 2 m, and those that overlap on a track."""
         each = list(enumerate(self.sections))
+        ends = [(f"sections.{k}.end", one.end, one.begin + SHORTEST) for k, one in each]
         found = [
-            Fault("", f"sections.{k}.end", f"{one.end:g} m", f"{one.begin + SHORTEST:g} m at least")
-            for k, one in each
-            if one.end < one.begin + SHORTEST
+            Fault("", key, f"{end:.12g} m", f"{least:.12g} m at least")
+            for key, end, least in ends
+            if end < least
         ]
         for (k, one), (n, other) in combinations(each, 2):
             same = one.track == other.track or None in (one.track, other.track)

@@ -197,6 +197,6 @@ class Settings(FileDefinition):
                 raise ValueError("'outputs.low_pass' needs a constant speed and 'output_rate'")
             if self.output_rate < least * (1.0 - 1e-9):
                 raise ValueError(
-                    f"'output_rate' must be {least:g} at least with 'outputs.low_pass' of "
+                    f"'output_rate' must be {least:.12g} at least with 'outputs.low_pass' of "
                     f"{asked.frequency:g} Hz"
                 )

@@ -347,7 +347,7 @@ def _load_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
         if highest is None or lowest is None:
             named.append(("fatigue.tare", fatigue.tare))
         elif highest <= lowest:
-            found = f"{highest:g} N is not above fatigue.min_load {lowest:g} N"
+            found = f"{highest:.12g} N is not above fatigue.min_load {lowest:.12g} N"
             yield Fault("", "fatigue.max_load", found, "the highest dynamic load")
     for key, name in named:
         if name not in loads:

@@ -165,7 +165,7 @@ def _parsed(text: str) -> Parameter:
         raise ValueError(f"SPREAD {spread:g}", "a share of the value above 0, such as 0.2")
     if not inside:
         allowed = "shares 0 to 1" if one.is_share else "factors below and above 1, such as 0.5:2"
-        raise ValueError(f"bounds {low:g} to {high:g}", allowed)
+        raise ValueError(f"bounds {low:.12g} to {high:.12g}", allowed)
     return replace(one, low=low, high=high, spread=spread)
 
 

@@ -184,8 +184,8 @@ def prepared(
     measurement = _moving(measurement)
     high = band[1]
     if measurement.rate < 2.5 * high:
-        found = f"{measurement.rate:.4g} values per second"
-        allowed = f"{2.5 * high:g} at least for a band up to {high:g} Hz"
+        found = f"{measurement.rate:.12g} values per second"
+        allowed = f"{2.5 * high:.12g} at least for a band up to {high:g} Hz"
         raise input_error(measurement.name, found, allowed, key="rate")
     many = measurement.rate > MOST_SAMPLED * high
     thinner = measurement.resampled(MOST_SAMPLED * high) if many else measurement

@@ -56,7 +56,7 @@ class ContactPath:
                 moved[:, w, column] += poses[:, w]
             rates = vehicle.rates(moved.reshape(-1, len(vehicle.x))).reshape(moved.shape)
         except ModelError as error:
-            words = f"found {1e3 * self.amplitude:g} mm, but {error}"
+            words = f"found {1e3 * self.amplitude:.12g} mm, but {error}"
             raise argument_error("amplitude", words, "a smaller amplitude") from None
         shares = 4.0 * sines / (ANGLES * self.amplitude)
         force, path = (np.tensordot(shares, values, 1) for values in (rates, poses))

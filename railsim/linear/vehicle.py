@@ -76,7 +76,7 @@ class Contact:
         faults, (low, high), size = Faults(), CONICITIES, self.amplitude
         known, found = self.linearisation in LINEARISATIONS, f"found '{self.linearisation}'"
         faults.require(known, "linearisation", found, " or ".join(LINEARISATIONS))
-        positive, found = math.isfinite(size) and size > 0.0, f"found {size:g} m"
+        positive, found = math.isfinite(size) and size > 0.0, f"found {size:.12g} m"
         faults.require(positive, "amplitude", found, "a positive number of m")
         used = self.linearisation == "harmonic" or size == AMPLITUDE
         faults.require(used, "amplitude", found, "only with linearisation harmonic")
@@ -134,8 +134,8 @@ class LinearVehicle:
         self.at = at
         self.contact = contact or Contact()
         faults = self.contact.faults()
-        faults.require(abs(radius) >= 5.0, "radius", f"found {radius:g} m", "5 m at least")
-        faults.require(abs(cant) <= 0.5, "cant", f"found {cant:g} m", "0.5 m at most")
+        faults.require(abs(radius) >= 5.0, "radius", f"found {radius:.12g} m", "5 m at least")
+        faults.require(abs(cant) <= 0.5, "cant", f"found {cant:.12g} m", "0.5 m at most")
         faults.check()
         check_types([vehicle], track)
         self.held, self.name = held, vehicle.name_with_load

@@ -68,8 +68,8 @@ def with_control(model: Model, vehicle: Vehicle, settings: Settings) -> Model:
     wiring = _Wiring(model, vehicle)
     for name, controller in (vehicle.controllers or {}).items():
         if settings.step is not None and controller.period < settings.step * (1.0 - 1e-9):
-            found = f"found {controller.period:g} s, shorter than the step of the settings"
-            wiring.fault(f"controllers.{name}.period", found, f"{settings.step:g} s at least")
+            found = f"found {controller.period:.12g} s, shorter than the step of the settings"
+            wiring.fault(f"controllers.{name}.period", found, f"{settings.step:.12g} s at least")
     return wiring.model()
 
 

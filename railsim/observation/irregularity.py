@@ -80,12 +80,12 @@ class Assumed:
         low, high = self.wavelengths
         known, faults = self.spectrum in SPECTRA, Faults()
         faults.require(known, "spectrum", f"found {self.spectrum}", nearest(self.spectrum, SPECTRA))
-        faults.require(self.scale > 0.0, "scale", f"found {self.scale:g}", "a positive number")
+        faults.require(self.scale > 0.0, "scale", f"found {self.scale:.12g}", "a positive number")
         for name, value in (("noise", self.noise), ("bias", self.bias)):
             allowed = "a positive number of m/s2"
-            faults.require(value > 0.0, name, f"found {value:g} m/s2", allowed)
+            faults.require(value > 0.0, name, f"found {value:.12g} m/s2", allowed)
         inside, allowed = 1.0 <= low < high <= 300.0, "shortest and longest, 1 to 300 m"
-        faults.require(inside, "wavelengths", f"found {low:g} to {high:g} m", allowed)
+        faults.require(inside, "wavelengths", f"found {low:.12g} to {high:.12g} m", allowed)
         faults.check()
 
     def power(self, wave_numbers: Floats, points: int) -> Floats:

@@ -90,9 +90,9 @@ def selected(
         allowed = (
             f"A below B, two instants at least, within {distance[0]:.1f} to {distance[-1]:.1f} m"
         )
-        faults.require(False, "between", f"{low:g} to {high:g} m", allowed)
+        faults.require(False, "between", f"{low:.12g} to {high:.12g} m", allowed)
     if rate is not None:
-        faults.require(0.0 < rate < np.inf, "rate", f"found {rate:g}", "above 0 per s")
+        faults.require(0.0 < rate < np.inf, "rate", f"found {rate:.12g}", "above 0 per s")
     faults.check()
     names = [selection.partition(":")[0] for selection in quantities]
     wanted = dict.fromkeys(["time", "distance", *(names or result)])

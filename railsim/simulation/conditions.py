@@ -86,8 +86,8 @@ def initial_speed(settings: Settings, speed: float | None, start: float) -> floa
         distance, value = np.array(settings.drive.speed_table).T
         first = float(np.interp(start, distance, value))
         if speed is not None and not math.isclose(speed, first, rel_tol=AS_IN_TABLE):
-            allowed = f"none, or {first:g} m/s, that of settings.drive.speed_table at the start"
-            raise argument_error("speed", f"found {speed:g} m/s", allowed)
+            allowed = f"none, or {first:.12g} m/s, that of settings.drive.speed_table at the start"
+            raise argument_error("speed", f"found {speed:.12g} m/s", allowed)
         return first
     if speed is None:
         raise argument_error("speed", "no speed is given", "a speed in m/s, e.g. 20")
@@ -98,20 +98,20 @@ def check_range(
     track: Track, speed: float, start: float, duration: float | None, until: float | None
 ) -> None:
     """Raise InputError with all faults of speed, start and end of a run."""
-    faults, end = Faults(), f"{track.length:g} m"
+    faults, end = Faults(), f"{track.length:.12g} m"
     low, high = SPEED_RANGE
     right = low <= speed <= high
-    faults.require(right, "speed", f"found {speed:g} m/s", f"{low:g} to {high:g} m/s")
+    faults.require(right, "speed", f"found {speed:.12g} m/s", f"{low:g} to {high:g} m/s")
     right = 0.0 <= start < track.length
-    faults.require(right, "start", f"found {start:g} m", f"0 to {end}")
+    faults.require(right, "start", f"found {start:.12g} m", f"0 to {end}")
     if duration is not None:
         right = 0.0 < duration < math.inf
-        faults.require(right, "duration", f"found {float(duration):g} s", "a positive number")
+        faults.require(right, "duration", f"found {float(duration):.12g} s", "a positive number")
         faults.require(until is None, "duration", "given together with `until`", "one of the two")
     if until is not None:
-        allowed = f"more than the start, {start:g} m, and at most {end}, the track's plan"
+        allowed = f"more than the start, {start:.12g} m, and at most {end}, the track's plan"
         right = start < until <= track.length
-        faults.require(right, "until", f"found {float(until):g} m", allowed)
+        faults.require(right, "until", f"found {float(until):.12g} m", allowed)
     faults.check()
 
 
@@ -155,8 +155,8 @@ def check_agreement(
     if settings.step is not None and settings.drive.mode == "constant":
         count = max(1, round(interval / settings.step))
         if abs(count * settings.step - interval) > WRITTEN * interval:
-            allowed = f"an integer fraction of the output interval {interval:g} s"
-            faults.append(Fault("settings", "step", f"found {settings.step:g} s", allowed))
+            allowed = f"an integer fraction of the output interval {interval:.12g} s"
+            faults.append(Fault("settings", "step", f"found {settings.step:.12g} s", allowed))
     faults.check()
 
 

@@ -126,8 +126,8 @@ class StepChoice:
         # a step is too long or not: growth at a shorter one comes from differences across a kink
         if requested <= stable:
             return requested
-        found = f"found {requested:g} s, unstable at {speed:g} m/s"
-        raise input_error("settings", found, f"at most {stable:g} s", "step")
+        found = f"found {requested:.12g} s, unstable at {speed:.12g} m/s"
+        raise input_error("settings", found, f"at most {stable:.12g} s", "step")
 
     def _stable(self, speed: float, interval: float) -> float:
         """Longest stable step at a speed that divides the output interval."""

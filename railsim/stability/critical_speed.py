@@ -184,11 +184,11 @@ def checked(
         inside = isinstance(value, Real) and least <= float(value) <= most
         faults.require(inside, name, f"found {value!r}", f"{least:g} to {most:g} m/s", option)
     if not faults:
-        words = f"less than the highest, {fastest:g} m/s"
-        faults.require(slowest < fastest, "low", f"found {slowest:g} m/s", words, "--from")
+        words = f"less than the highest, {fastest:.12g} m/s"
+        faults.require(slowest < fastest, "low", f"found {slowest:.12g} m/s", words, "--from")
     faults.require(points in range(2, 201), "points", f"found {points!r}", "2 to 200")
     wrong = [size for size in excitations if not SMALL <= size <= LARGEST_EXCITATION]
-    words = f"found {wrong[0]:g} m" if wrong else "no size"
+    words = f"found {wrong[0]:.12g} m" if wrong else "no size"
     allowed, fine = f"{SMALL:g} to {LARGEST_EXCITATION:g} m", len(excitations) and not wrong
     faults.require(fine, "excitations", words, allowed, "--excitation")
     used = "bifurcation" in methods or points == POINTS

@@ -265,17 +265,17 @@ def check_grid(
     least = f"{SMALLEST_RADIUS:g} m at least, negative to the left"
     for value in radius:
         right = math.isfinite(value) and abs(value) >= SMALLEST_RADIUS
-        faults.require(right, "radius", f"found {value:g} m", least)
+        faults.require(right, "radius", f"found {value:.12g} m", least)
     faults.require(
-        0.0 <= cant <= LARGEST_CANT, "cant", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m"
+        0.0 <= cant <= LARGEST_CANT, "cant", f"found {cant:.12g} m", f"0 to {LARGEST_CANT:g} m"
     )
     for value in friction:
-        faults.require(0.0 < value <= 2.0, "friction", f"found {value:g}", "above 0, at most 2")
+        faults.require(0.0 < value <= 2.0, "friction", f"found {value:.12g}", "above 0, at most 2")
     low, high = SPEED_RANGE
     for value in deficiency:
         speeds = [_speed(r, cant, value) for r in radius] if not faults else []
         fine = math.isfinite(value) and all(low <= v <= high for v in speeds)
-        found = f"found {value:g} m with a cant of {cant:g} m"
+        found = f"found {value:.12g} m with a cant of {cant:.12g} m"
         allowed = f"a sum that gives speeds of {low:g} to {high:g} m/s"
         if value > LARGEST_DEFICIENCY:
             fine, allowed = False, f"{LARGEST_DEFICIENCY:g} m at most: 0.1 is 100 mm"

@@ -172,7 +172,7 @@ def assess_track(
     Raises InputError: all faults of the inputs; no recording in the track.
     """
     if not 0.0 < share <= 10.0:
-        raise argument_error("share", f"found {share:g}", "above 0, up to 10")
+        raise argument_error("share", f"found {share:.12g}", "above 0, up to 10")
     folder = Path(out)
     check_folder(folder)
     track = recorded(recording)
@@ -182,7 +182,7 @@ def assess_track(
         raise argument_error("vehicles", found, "each vehicle once; files of different names")
     low, high = SPEED_RANGE
     if wrong := [speed for speed in speeds if not low <= speed <= high]:
-        raise argument_error("speeds", f"found {wrong[0]:g} m/s", f"{low:g} to {high:g} m/s")
+        raise argument_error("speeds", f"found {wrong[0]:.12g} m/s", f"{low:g} to {high:g} m/s")
     missing = [n for n, v in tested.items() if v.service is None]
     if missing:
         allowed = "add [service] with admissible_speed and cant_deficiency"

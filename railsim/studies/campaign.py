@@ -259,7 +259,7 @@ def _curve_faults(track: Track, part: Part, file: str, key: str) -> Iterator[Fau
         if not 0.999 * low - 1e-6 <= value <= 1.001 * high + 1e-6:
             ends = " to ".join(dict.fromkeys(f"{end:.6g}" for end in (low, high)))
             allowed = f"{ends} {unit} in the curves of {of_track}"
-            yield Fault(file, f"{key}.{own}", f"{value:g} {unit}", allowed)
+            yield Fault(file, f"{key}.{own}", f"{value:.12g} {unit}", allowed)
 
 
 def part_speed(speed: Speed, service: Service) -> float:

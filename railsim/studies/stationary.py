@@ -164,7 +164,7 @@ def stationary(
             raise InputError([Fault(name, "service", "missing", allowed, name)])
         cant = vehicle.service.cant_deficiency
     if not 0.0 < cant <= 0.5:
-        raise argument_error("cant", f"found {cant:g} m", "above 0, up to 0.5 m")
+        raise argument_error("cant", f"found {cant:.12g} m", "above 0, up to 0.5 m")
     twists = twist_heights(flat, limits)
     settings = settings or Settings()
     model = assemble(vehicle, circle(track), settings.in_steady_rolling())

@@ -295,10 +295,10 @@ def _check(wearing: Wearing, how: Loop) -> None:
     low, high = SPEED_RANGE
     for run in wearing.runs:
         on = f"for {run.vehicle.name} on {run.track.name}"
-        found, allowed = f"found {run.speed:g} m/s {on}", f"{low:g} to {high:g} m/s"
+        found, allowed = f"found {run.speed:.12g} m/s {on}", f"{low:g} to {high:g} m/s"
         faults.require(low <= run.speed <= high, what, found, allowed, option)
         right = run.share > 0.0 and math.isfinite(run.share)
-        found = f"found a share of {run.share:g} {on}"
+        found = f"found a share of {run.share:.12g} {on}"
         faults.require(right, what, found, "above 0", option)
     right = how.step > 0.0 and math.isfinite(how.step)
     faults.require(right, "step", f"found {wearing.amount(how.step)}", "above 0")

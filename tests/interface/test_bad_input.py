@@ -303,3 +303,20 @@ def test_what_is_wrong_is_said_before_long_work(work, given, words, tmp_path, mo
     assert main([*given.split(), "--out", "out"]) == 2
     assert words in capsys.readouterr().err
     assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("command", "found"),
+    [
+        (["stationary", "coach_manchester", "--cant", "0.5000001"], "found 0.5000001 m; above 0"),
+        (["contact", "--gauge", "2.5000001"], "found 2.5000001; 0.3 to 2.5 m"),
+        (["contact", "--creep", "--friction", "1.0000001"], "found 1.0000001; above 0"),
+        (["run", "coach_manchester", "straight", "--speed", "20", "--until", "1000.00001"],
+         "found 1000.00001 m; more than the start, 0 m, and at most 1000 m"),
+        (["curving", "coach_manchester", "--radius", "300", "--friction", "2.0000001"],
+         "found 2.0000001; above 0, at most 2"),
+    ],
+)  # fmt: skip
+def test_a_refused_number_does_not_read_like_its_limit(command, found, capsys):
+    assert main(command) == 2
+    assert found in capsys.readouterr().err

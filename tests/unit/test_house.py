@@ -2,6 +2,7 @@
 
 import ast
 import gc
+import re
 from functools import cache
 from pathlib import Path
 
@@ -133,3 +134,10 @@ def test_defaults_that_are_repeated_are_the_same_everywhere():
                 others += [(name, function.name, key)] * (value.value != USUAL[key])
     assert others == []
     assert count > 30
+
+
+def test_what_was_found_does_not_read_like_its_limit():
+    """Six digits show 0.5000001 as 0.5, which is allowed: messages show twelve."""
+    short = re.compile(r"found \{[^}\"]*:\.?[1-9]?g\}")
+    paths = PACKAGE.rglob("*.py")
+    assert [name.name for name in paths if short.search(name.read_text())] == []

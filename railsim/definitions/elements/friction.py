@@ -289,7 +289,7 @@ class Wedge(VerticalSpring, PointElement):
         if self.preload != "auto" and self.preload[2] < 0.0:
             raise ValueError(
                 "wedges press and never pull: 'preload' along z, on the side frame and positive "
-                f"downwards, must not be negative; found {self.preload[2]:g}"
+                f"downwards, must not be negative; found {self.preload[2]:.12g}"
             )
         if self.points is not None and self.points[0][2] < self.points[1][2]:
             raise ValueError(

@@ -88,7 +88,7 @@ class RailSections(Definition):
             raise ValueError("'end' must lie 0.1 m behind 'begin' at least")
         for before, after in pairwise(self.contours or ()):
             if after.s <= before.s:
-                raise ValueError(f"sections out of order: {after.s:g} after {before.s:g} m")
+                raise ValueError(f"sections out of order: {after.s:.12g} after {before.s:.12g} m")
             jump = before.jump(after)
             if jump > max(MOST_JUMP, STEEPEST * (after.s - before.s)):
                 raise ValueError(

@@ -41,7 +41,7 @@ class Harmonics(Uneven):
     def _whole_orders(self) -> None:
         for order, _, _ in self.waves:
             if order != round(order):
-                raise ValueError(f"the order {order:g} is no whole number")
+                raise ValueError(f"the order {order:.12g} is no whole number")
 
 
 class RadiusTable(Uneven):
