@@ -23,6 +23,7 @@ from railsim.assessment.signals import Band, Signal, Signals
 from railsim.contact.geometry import ContactGeometry
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.result.filters import distance_means, window_centres
+from railsim.table import beside
 
 SAFETY, LOADING, RIDE, INFORMATION = "safety", "loading", "ride", "information"
 VERDICTS = (SAFETY, LOADING, RIDE)
@@ -206,11 +207,11 @@ class Criterion:
         """Factor from SI to the unit in tables."""
         return 1e-3 if self.unit == "kN" else 1.0
 
-    def text(self, value: float) -> str:
-        """Value in the unit of tables; a hyphen where there is none."""
+    def text(self, value: float, limit: float = math.nan) -> str:
+        """Value in the unit of tables, see `beside`; a hyphen where there is none."""
         if math.isnan(value):
             return "-"
-        return f"{self.scale * value:.3f}" if self.scale == 1.0 else f"{self.scale * value:.2f}"
+        return beside(self.scale * value, self.scale * limit, 3 if self.scale == 1.0 else 2)
 
 
 BOTH = ("normal", "simplified")

@@ -17,6 +17,7 @@ from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.table import Amount, Column, Table
 from railsim.text import counted_remarks, spreadsheet_cell
 
+_SHARE = Column("share", "% of limit", format=".1f")
 SHORT = {"one": "1-dim.", "two": "2-dim.", "largest": "largest", "smallest": "smallest"}
 
 
@@ -38,7 +39,7 @@ def zone_table(zone: ZoneReport) -> Table:
         Column("quantity", title), Column("location"), Column("unit"), Column("N", format="d"),
         Column("mean", format=">"), Column("s", format=">"), Column("method"),
         Column("estimate", format=">"), Column("limit", format=">"),
-        Column("share", "% of limit", format=".1f"),
+        _SHARE,
     ]  # fmt: skip
     return Table(columns, map(_row, zone.nearest))
 
@@ -67,13 +68,15 @@ def _row(row: Assessed) -> list[object]:
     about, estimate = row.criterion, row.estimate
     limited = row.limit == row.limit
     column = Column(about.name, unit=about.unit, format=".3f" if about.scale == 1.0 else ".2f")
-    value: object = Amount(estimate.value, column)
+    limit = row.limit if limited else None
+    value: object = Amount(estimate.value, column, limit=limit)
     if row.uncorrected is not None:
-        value = f"{about.text(estimate.value)} (uncorrected {about.text(row.uncorrected.value)})"
+        before = about.text(row.uncorrected.value)
+        value = f"{about.text(estimate.value, row.limit)} (uncorrected {before})"
     return [
         about.words, row.place, about.unit, estimate.N, Amount(estimate.mean, column),
         Amount(estimate.deviation, column), SHORT[estimate.method], value,
-        Amount(row.limit if limited else None, column), 100.0 * row.share if limited else None,
+        Amount(limit, column), Amount(100.0 * row.share, _SHARE, limit=100.0) if limited else None,
     ]  # fmt: skip
 
 
@@ -127,7 +130,12 @@ def _safety(run: str, report: SafetyReport) -> list[Table]:
         Column("climb_distance", "climb", "m", ".2f"), Column("rise", "rise on it", "mm", ".2f"),
         Column("lifted", "off its rail"),
     ]  # fmt: skip
-    rows = [vars(w) | {"lifted": "yes" if w.lifted else ""} for w in report.wheels]
+    rows = [
+        vars(w)
+        | {"Y_over_Q": Amount(w.Y_over_Q, wheels[2], limit=w.limit)}
+        | {"lifted": "yes" if w.lifted else ""}
+        for w in report.wheels
+    ]
     bogies = [Column("bogie"), Column("overturning", format=".3f")]
     return [Table(wheels, rows), Table(bogies, list(report.overturning.items()))]
 

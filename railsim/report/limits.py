@@ -191,7 +191,7 @@ def _rows(one: Assessment) -> list[Table]:
             rows.append([
                 (row.criterion.words, row.place), row.criterion.unit, str(e.N), text(e.mean),
                 text(e.deviation), METHOD[e.method], text(float(line.at(line.target))) if line
-                else "", text(line.error) if line else "", text(e.value),
+                else "", text(line.error) if line else "", text(e.value, row.limit),
                 text(row.uncorrected.value) if row.uncorrected else "",
                 text(row.limit) if bounded else "none",
                 _origin(row.source, row.checked) if bounded else "for information",
@@ -326,18 +326,17 @@ def _cell(pair: tuple[ZoneReport, Row] | None) -> Cell:
     zone, row = pair
     words = [f"{beside(100.0 * row.share, 100.0)} %", row.place, METHOD[row.estimate.method]]
     if row.uncorrected is not None:
-        words.append(f"uncorrected {row.criterion.scale * row.uncorrected.value:.3g}")
+        words.append(f"uncorrected {row.criterion.text(row.uncorrected.value)}")
     if math.isnan(row.share):
-        mean = f"{row.estimate.N} value, mean {row.criterion.scale * row.estimate.mean:.3g}"
+        mean = f"{row.estimate.N} value, mean {row.criterion.text(row.estimate.mean)}"
         words = [mean, row.place]
     small = ", ".join(filter(None, [*words, zone.population.name]))
-    value, limit = (row.criterion.scale * of for of in (row.estimate.value, row.limit))
-    return "-" if math.isnan(value) else beside(value, limit, 3, "g"), small
+    return row.criterion.text(row.estimate.value, row.limit), small
 
 
 def _limit(row: Row) -> tuple[str, str]:
     unit = row.criterion.unit.replace("-", "")
-    return f"{row.criterion.scale * row.limit:.3g} {unit}", _origin(row.source, row.checked)
+    return f"{row.criterion.text(row.limit)} {unit}", _origin(row.source, row.checked)
 
 
 def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:
@@ -358,7 +357,7 @@ def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:
         climb = f"{max(w.climb_distance for w in report.wheels):.2f} m"
         known = [x for x in report.overturning.values() if not math.isnan(x)]
         tilt = f"{max(known):.2f}" if known else ""
-        rows.append([run, worst.place, f"{worst.Y_over_Q:.3f}", f"{worst.limit:.3f}",
+        rows.append([run, worst.place, beside(worst.Y_over_Q, worst.limit, 3), f"{worst.limit:.3f}",
                      f"{beside(100.0 * share, 100.0)} %", climb, tilt, lifted])  # fmt: skip
     header = ["run", "wheel", "largest Y/Q", "limit", "share", "climb", "overturning", "lifted"]
     caption = "Derailment: the wheel nearest to Nadal's limit"

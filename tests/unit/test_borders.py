@@ -9,7 +9,9 @@ from pydantic import ValidationError
 
 from railsim.assessment.comfort_report import class_of
 from railsim.assessment.conditions import _conicity
+from railsim.assessment.criteria import CRITERIA
 from railsim.assessment.model_comparison import QUANTITIES, Comparison, Pair
+from railsim.assessment.tables import zone_table
 from railsim.assessment.wear import Patches, archard, krause_poll, pearce_sherratt_1991, usfd
 from railsim.assessment.zones import Assessed
 from railsim.definitions.elements.actuator import Actuator
@@ -35,6 +37,7 @@ from railsim.definitions.vehicle.tables import Service
 from railsim.definitions.wear_law import ArchardMap, FrictionWork, WearLawFile
 from railsim.errors import InputError
 from railsim.observation import Assumed
+from railsim.report.limits import _cell, _limit
 from railsim.simulation.conditions import check_range, initial_speed
 from railsim.studies.stationary import StationaryValue
 
@@ -442,3 +445,15 @@ AT_THE_BORDER = {
 @pytest.mark.parametrize(("function", "values"), AT_THE_BORDER.values(), ids=AT_THE_BORDER)
 def test_what_a_border_belongs_to(function, values):
     assert [(x, function(x)) for x, _ in values] == values
+
+
+def test_an_estimate_above_its_limit_reads_so_on_terminal_and_page():
+    """38.652 kN beside 38.65 kN are 38.65 both, and 38.7 to three digits."""
+    estimate = SimpleNamespace(value=38652.0, N=1, mean=38652.0, deviation=0.0, method="largest")
+    row = Assessed(CRITERIA["sum_Y"], "wheelset 1", estimate, 38650.0)
+    assert row.exceeded
+    zone = SimpleNamespace(title="zone 4", values=[1], needed=25, nearest=[row])
+    shown = zone_table(zone).texts()[0]
+    assert shown[-3:] == ["38.652", "38.65", "100.01"]
+    apart = SimpleNamespace(population=SimpleNamespace(name=""))
+    assert (_cell((apart, row))[0], _limit(row)[0]) == ("38.652", "38.65 kN")
