@@ -60,8 +60,8 @@ def units_of(records: Sequence[Record], used: Sequence[Used]) -> dict[str, str]:
     return {key: next(filter(None, (unit_of_input(one, key) for one in used)), "") for key in keys}
 
 
-def _assumed(used: Sequence[Used]) -> Table:
-    """Return the assumptions of the runs, those of all once."""
+def _assumed(used: Sequence[Used], whole: str) -> Table:
+    """Return the assumptions of runs; those that are the same in all, once, under `whole`."""
     found: dict[str, dict[str, dict[str, None]]] = {}
     for one in used:
         own = found.setdefault(f"{one.vehicle_label} on {one.track_label}", {})
@@ -69,7 +69,7 @@ def _assumed(used: Sequence[Used]) -> Table:
             key, words = line.split(None, 1)
             own.setdefault(key, {})[words] = None
     if all(own == next(iter(found.values())) for own in found.values()):
-        found = {"all runs": next(iter(found.values()))}
+        found = {whole: next(iter(found.values()))}
     keys = dict.fromkeys(key for own in found.values() for key in own)
     shown, more = dict(list(found.items())[:MOST_ASSUMED]), len(found) - MOST_ASSUMED
     rows = [[key, *(_either(list(own.get(key, ()))) for own in shown.values())] for key in keys]
@@ -94,7 +94,10 @@ def what_was_run(
         vehicles.setdefault(one.vehicle_label, one.vehicle)
         tracks.setdefault(one.track_label, []).append(one.track)
     if used and not results:
-        section.texts.append("Vehicles and tracks as their files are now; results were not kept.")
+        section.texts.append(
+            "Vehicles and tracks as their files are now, with the values of the first run of each "
+            "vehicle on each track; results were not kept."
+        )
     for name, vehicle in vehicles.items():
         words = f"{_named(vehicle, name)}{vehicle.source or ''}"
         kinds = [kind.replace("_", " ") for kind in element_kinds(vehicle)]
@@ -114,7 +117,7 @@ def what_was_run(
     if inputs:
         section.tables.append(_inputs(inputs))
     if used:
-        section.tables.append(_assumed(used))
+        section.tables.append(_assumed(used, "all runs" if results or not inputs else "first runs"))
     if results:
         section.tables.append(_settings(results))
     return section

@@ -443,6 +443,15 @@ def test_assumptions_are_those_of_all_runs_of_a_vehicle_on_a_track():
     assert "; or" not in cells["forces"]
 
 
+def test_assumptions_without_results_are_not_said_to_be_of_all_runs():
+    """The files tell those of the first run of each pair, whatever else was varied."""
+    (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": example_result()})
+    section = what_was_run([used], {}, {"grid": {"track.friction": ["0.4", "0.1"]}})
+    assert "of the first run of each vehicle on each track" in section.texts[0]
+    (table,) = (t for t in section.tables if t.caption == "Assumptions")
+    assert table.header == ["", "first runs"]
+
+
 def test_inputs_are_those_of_all_runs_also_without_curves():
     """Of eight runs of 36 curves are shown: the page told the inputs of these alone."""
     shown = example_result()
