@@ -3,17 +3,17 @@
 import logging
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import argument_error
+from railsim.errors import argument_error, listed
 from railsim.kernels.controllers import START
 from railsim.kernels.state import TIME
-from railsim.model.assembly import assemble
+from railsim.model.assembly import Model, assemble
 from railsim.model.control import periods, with_control
 from railsim.model.equilibrium import Equilibrium, stored_equilibrium
 from railsim.model.plausibility import gauge_remarks, narrow_remarks, vehicle_remarks
@@ -70,7 +70,7 @@ def prepare(
             on_run_in,
             remarks.append if settings.start_state == "steady" else None,
         )
-        remarks += disturb(model, balance.Q0, settings, state)
+        remarks += [*begins_on_sections(model, start), *disturb(model, balance.Q0, settings, state)]
     else:
         state = _taken_up(before.motion, model.n_state)
     model = with_control(model, vehicle, settings)
@@ -90,6 +90,20 @@ def prepare(
         remarks=tuple(remarks),
     )
     return replace(prepared, evaluation=_evaluation(prepared, settings))
+
+
+def begins_on_sections(model: Model, start: float) -> Iterator[str]:
+    """Remark on wheelsets that are within a range of sections at the start [m]."""
+    system = model.system
+    places = start + system.frame_offset[system.bodies.frame[system.contact.body]]
+    begin, end = model.rails.ends.T
+    inside = ((begin < places[:, None]) & (places[:, None] < end)).any(axis=1)
+    names = [name for name, there in zip(model.index.wheelsets, inside, strict=True) if there]
+    if names:
+        yield (
+            f"The run begins with {listed(names)} within a range of track.sections, in the state "
+            "on the plain rail: its first forces are not those of a run from before the range."
+        )
 
 
 def _balanced(

@@ -12,6 +12,7 @@ from railsim.kernels.contact_columns import W_Q, WHEEL_COLUMNS
 from railsim.kernels.support import MOST_CORRECTIONS
 from railsim.kernels.vibration import AMPLITUDE, FREQUENCY, VIBRATION
 from railsim.result.stored import lost_peak
+from railsim.simulation.preparation import begins_on_sections
 from railsim.simulation.remarks import (
     beyond_experience,
     creep_range,
@@ -159,3 +160,17 @@ def test_each_remark_is_logged_once_and_what_was_asked_for_is_not(caplog):
     assert len(low_passed) == 1
     assert sorted(logged) == sorted(set(result.remarks) - set(low_passed))
     assert any("Nothing disturbs the vehicle laterally" in remark for remark in logged)
+
+
+@pytest.mark.parametrize(("start", "names"), [(39.0, ""), (39.5, "a"), (50.5, "b"), (45.0, "")])
+def test_a_run_that_begins_on_changing_rails_says_so(start, names):
+    """Wheelsets 10 m ahead of the reference body and 1 m behind it; a range from 49.2 to 51.7 m."""
+    under = Record(
+        frame_offset=np.array([0.0, 10.0, -1.0]),
+        bodies=Record(frame=np.array([0, 1, 2])),
+        contact=Record(body=np.array([1, 2])),
+    )
+    index, rails = Record(wheelsets=("a", "b")), np.array([[49.2, 51.7]])
+    model = Record(system=under, index=index, rails=Record(ends=rails))
+    found = "".join(begins_on_sections(model, start))
+    assert found[:26] == (f"The run begins with {names} with" if names else "")
