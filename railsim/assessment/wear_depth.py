@@ -180,9 +180,14 @@ def parts_of_step(profile: Profile, depth: Floats, distance: float) -> int:
     parts = max(math.ceil(worn / UPDATE), 1)
     if not parts <= MOST_PARTS:
         allowed = f"at most {1e3 * MOST_PARTS * UPDATE:g} mm in a step"
-        found = f"{1e-3 * distance:g} km wear it {1e3 * worn:.3g} mm deep"
+        found = f"{_amount(profile, distance)} wear it {1e3 * worn:.3g} mm deep"
         raise input_error(profile.name, found, allowed, "step")
     return parts
+
+
+def _amount(profile: Profile, amount: float) -> str:
+    """Distance that a wheel has run [m], or tonnage over a rail [kg], as messages give it."""
+    return f"{1e-9 * amount:.4g} Mt" if profile.kind == "rail" else f"{1e-3 * amount:.4g} km"
 
 
 def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
@@ -196,8 +201,8 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     worn = depth * distance
     most = deepest(profile, worn)
     if most > DEEPEST:
-        allowed = f"at most {1e3 * DEEPEST:g} mm: {1e-3 * distance * DEEPEST / most:.4g} km"
-        found = f"{1e-3 * distance:g} km wear {1e3 * most:.3g} mm deep"
+        allowed = f"at most {1e3 * DEEPEST:g} mm: {_amount(profile, distance * DEEPEST / most)}"
+        found = f"{_amount(profile, distance)} wear {1e3 * most:.3g} mm deep"
         raise argument_error("step", found, allowed)
     smooth = scattered(profile, worn)
     side, lost = upper_side(profile), np.zeros(len(profile.y))

@@ -4,10 +4,18 @@ import numpy as np
 import pytest
 
 import railsim
-from railsim.assessment.wear_depth import SPACING, grid, rail_depth, wheel_dimensions, worn_profile
+from railsim.assessment.wear_depth import (
+    SPACING,
+    grid,
+    parts_of_step,
+    rail_depth,
+    wheel_dimensions,
+    worn_profile,
+)
 from railsim.assessment.wear_depth import worn_depth as wheel_depth
 from railsim.constants import GRAVITY
 from railsim.definitions.settings import Settings
+from railsim.errors import InputError
 from railsim.profiles import load_profile
 from railsim.studies.rail_wear import Traffic, rail_rows, rail_wear
 
@@ -134,3 +142,11 @@ def test_dimensions_of_the_wheel():
     hollow = wheel_dimensions(load_profile("S1002_hollow"))
     assert 0.2e-3 < hollow.hollow < 0.9e-3
     assert hollow.flange_height > found.flange_height
+
+
+@pytest.mark.parametrize("steps", [parts_of_step, worn_profile])
+def test_too_much_wear_of_a_rail_is_told_with_the_tonnage(steps):
+    """10 Mt that wear it 20 mm deep: they were called 1e+07 km."""
+    depth = np.where(np.abs(grid()) < 0.03, 2e-12, 0.0)  # m/kg
+    with pytest.raises(InputError, match=r"10 Mt wear (it )?20 mm deep; at most"):
+        steps(load_profile("60E1"), depth, 1e10)
