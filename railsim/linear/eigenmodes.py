@@ -77,6 +77,9 @@ def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
     solved: Any = eig(linearisation.matrix, left=True, right=True)
     parts: list[Complexes] = [np.asarray(part, dtype=complex) for part in solved]
     values, left, right = parts
+    # by which rounding parts a double zero, as of a free vehicle, into a pair or two real values
+    apart = np.sqrt(np.finfo(float).eps * np.linalg.norm(linearisation.matrix))
+    values[np.abs(values) < apart] = 0.0
     upper = np.flatnonzero(values.imag >= 0.0)
     order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
     shapes = right[:, order].T

@@ -317,3 +317,14 @@ def test_branches_give_the_speeds_at_which_a_curve_passes_limits_and_where_it_en
         pytest.approx(4e-3),
     )
     assert not jumps([Branch("continuation", points)])
+
+
+@pytest.mark.parametrize("rounding", [0.0, 1e-17, -1e-17])
+def test_a_double_zero_is_two_zeros_however_it_is_rounded(rounding):
+    """A free mass beside an oscillator; the rounding would make it a pair, or a growth of 3e-9."""
+    matrix = np.zeros((4, 4))
+    matrix[0, 1], matrix[1, 0] = 1.0, rounding
+    matrix[2:, 2:] = [[0.0, 1.0], [-4.0, -0.4]]
+    found = eigenmodes(Linearisation(("x", "v", "y", "w"), matrix, np.zeros(4), 1.0))
+    assert found.eigenvalues[:2].tolist() == [0.0, 0.0]
+    assert len(found.eigenvalues) == 3
