@@ -82,7 +82,8 @@ class Assessment:
     @property
     def exceeded(self) -> bool:
         """Whether a limit is exceeded or a run derailed."""
-        return self.verdict in (FAIL, DERAILED)
+        of_runs = any(report.exceeded for report in self.safety.values())
+        return self.verdict in (FAIL, DERAILED) or of_runs
 
     @property
     def reasons(self) -> tuple[str, ...]:

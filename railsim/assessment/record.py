@@ -17,7 +17,6 @@ from railsim.definitions.vehicle.bogies import bogie_name
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, InputError
 from railsim.result import Result
-from railsim.result.hunting import HUNTS
 from railsim.result.sensors import Sensor, readings, sensors
 from railsim.track.alignment import Alignment
 
@@ -242,8 +241,7 @@ class Record:
 
     def remarks(self) -> list[str]:
         """Notes on the record for the reader of the assessment."""
-        said = self.result.remarks
-        found = [f"{self.name}: {one}" if one.startswith(HUNTS) else one for one in said]
+        found = [f"{self.name}: {one}" for one in self.result.remarks]
         if self.coarse:
             found.append(f"{self.name}: {self.coarse}: {self._loss}")
         return found

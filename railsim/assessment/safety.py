@@ -121,10 +121,16 @@ class SafetyReport:
     wheels: tuple[WheelSafety, ...]
     # largest magnitude of (sum Q_left - sum Q_right)/(sum Q) by bogie [1]
     overturning: dict[str, float]
+    derailed: bool  # whether the run ended so
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether the run derailed, or Y/Q of a wheel exceeds Nadal's limit."""
+        return self.derailed or any(wheel.Y_over_Q > wheel.limit for wheel in self.wheels)
 
     def record(self) -> dict[str, Any]:
         """Return it as plain numbers and strings, SI."""
-        return {"wheels": [*map(asdict, self.wheels)], "overturning": self.overturning}
+        return asdict(self)
 
 
 def safety_report(record: Record) -> SafetyReport:
@@ -151,7 +157,7 @@ def safety_report(record: Record) -> SafetyReport:
             wheels.append(WheelSafety(*own, bool(unloaded.any())))
     Q = result["Q"][rows]
     most = {name: largest_overturning(Q[:, own]) for name, own in record.bogies.items()}
-    return SafetyReport(tuple(wheels), most)
+    return SafetyReport(tuple(wheels), most, result.status == "derailed")
 
 
 def _height(record: Record, w: int, side: int) -> np.ndarray:

@@ -192,5 +192,12 @@ def assessment_lines(assessment: Assessment, *, quiet: bool) -> list[str | Table
         lines += [f"    {reason}" for reason in assessment.reasons]
     for table in tables(assessment):
         lines += ["", table]
-    remarks = [] if quiet else counted_remarks(("", remark) for remark in assessment.remarks)
+    remarks = [] if quiet else counted_remarks(_of_runs(assessment))
     return [*lines, *[""] * (not quiet), *(f"remark: {one}" for one in remarks)]
+
+
+def _of_runs(assessment: Assessment) -> Iterator[tuple[str, str]]:
+    """Yield remarks with the names of their runs, nothing where they are of all."""
+    for remark in assessment.remarks:
+        name, _, words = remark.partition(": ")
+        yield (name, words) if name in assessment.runs else ("", remark)

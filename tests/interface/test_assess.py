@@ -15,7 +15,7 @@ from railsim.assessment import Assessment, assess, running
 from railsim.assessment.comfort import MeanComfort, event_comfort
 from railsim.assessment.comfort_report import PointComfort, underestimated
 from railsim.assessment.safety import flange_angle
-from railsim.assessment.tables import tables
+from railsim.assessment.tables import assessment_lines, tables
 from railsim.assessment.wear import wear_law
 from railsim.cli import main
 from railsim.cli.assess import FILES
@@ -390,6 +390,32 @@ def test_derailed_run_is_no_pass():
     (found,) = assess(made(track(STRAIGHT), FAST, status="derailed"), "comfort")
     said = "run: derailed, made up; only the part before that is assessed"
     assert any(remark.endswith(said) for remark in found.remarks), found.remarks
+    # the criterion of derailment itself
+    (found,) = assess(made(track(STRAIGHT), FAST, status="derailed"), "safety")
+    assert found.exceeded
+
+
+@pytest.mark.parametrize(("quotient", "exceeded"), [(1.11, False), (1.13, True)])
+def test_nadals_limit_counts_for_the_exit_status(quotient, exceeded):
+    """S1002 has 70 degrees: 1.12 with friction 0.4."""
+    profiles = {"S1002": load_profile("S1002"), "60E1": load_profile("60E1")}
+    pushed = 2.0 * quotient * Q0
+    how = {"Y": lambda t, s: both_sides(pushed + 0.0 * s), "profiles": profiles}
+    run = made(track(STRAIGHT), FAST, **how)
+    assert assess(run, "safety")[0].exceeded == exceeded
+
+
+def test_remarks_of_several_runs_name_theirs():
+    run = made(track(STRAIGHT), FAST)
+    facts = {**run.attributes, "remarks": "A wheel lifts off."}
+    lifts = Result({n: run[n] for n in run}, run.quantities, run.coordinates, facts, run.profiles)
+    for standard in ("safety", "en14363"):
+        (found,) = assess({"calm": run, "lifts": lifts}, standard)
+        lines = [str(line) for line in assessment_lines(found, quiet=False)]
+        assert "remark: lifts: A wheel lifts off." in lines
+        (found,) = assess({"first": lifts, "second": lifts}, standard)
+        lines = [str(line) for line in assessment_lines(found, quiet=False)]
+        assert "remark: 2 runs: A wheel lifts off." in lines
 
 
 def test_excess_is_a_failure_even_with_few_sections():
