@@ -230,13 +230,13 @@ def _shared(positions: Floats, others: Floats) -> Any:
 
 def comparison_table(rows: Sequence[Comparison]) -> Table:
     """Return comparisons with one line for each value, SI."""
-    names = ("quantity", "unit", "where", "result", "value", "wheelset", "side", *PLACE,
-             "difference")  # fmt: skip
+    words = "quantity", "unit", "where", "result", "value", "wheelset", "side"
+    columns: list[Column | str] = [*words, *PLACE, "difference"]
     lines = []
     for row in rows:
         values = row.record()["values"].items()
         lines += [{**value, "where": row.where, "result": label} for label, value in values]
-    return Table(names, lines)
+    return Table(columns, lines)
 
 
 def comparison_tables(rows: Sequence[Comparison], results: Mapping[str, Result]) -> list[Table]:
