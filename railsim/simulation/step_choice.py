@@ -127,7 +127,7 @@ class StepChoice:
         if requested <= stable:
             return requested
         found = f"found {requested:.12g} s, unstable at {speed:.12g} m/s"
-        raise input_error("settings", found, f"at most {stable:.12g} s", "step")
+        raise input_error("settings", found, f"at most {stable:g} s", "step")
 
     def _stable(self, speed: float, interval: float) -> float:
         """Longest stable step at a speed that divides the output interval."""

@@ -109,7 +109,7 @@ def test_what_is_no_file_is_refused_by_every_command(name, ending, refused, tmp_
         ),
         (
             [*WEAR, "--distance", "1000", "--step", "5e-324"],
-            ("--step: found 4.94066e-324 km", "1 to 1000"),
+            ("--step: found 4.94065645841e-324 km", "1 to 1000"),
         ),
     ],
 )  # fmt: skip
