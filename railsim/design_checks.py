@@ -62,16 +62,8 @@ def check_table(checks: Sequence[Check], *, notes: bool = False) -> Table:
         column = Column("", unit=unit, format=".2f" if unit else ".3f")
         met = "-" if check.sense == "about" else "pass" if check.ok else "fail"
         limit = f"{signs[check.sense]} {column.text(check.limit)}"
-        rows.append(
-            [
-                check.name,
-                Amount(check.value, column, limit=check.limit),
-                limit,
-                unit,
-                met,
-                check.note,
-            ]
-        )
+        value = Amount(check.value, column, limit=check.limit)
+        rows.append([check.name, value, limit, unit, met, check.note])
     numbers = Column("value", format=".2f"), Column("must be", format=">")
     columns: list[Column | str] = ["check", *numbers, "unit", "met", "comparison"]
     count = len(columns) if notes else len(columns) - 1
