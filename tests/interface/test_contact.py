@@ -188,6 +188,21 @@ def test_left_and_right_may_differ(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures("small_contact_tables")
+def test_the_smaller_wheel_stands_for_steering_and_gauge_values(capsys):
+    """Radius of the lateral contact 0.5 rad: e r0/R over the largest difference before it."""
+    radii = 0.460, 0.455
+    data = as_json(capsys, "S1002", "60E1", *(f"--radius={r}" for r in radii))
+    y, angle = np.array(data["lateral"]), np.array(data["contact_angle_left"])
+    before = (y <= 0.0) & (y > y[y <= 0.0][angle[y <= 0.0] > 0.5].max())
+    i, middle = np.flatnonzero(before)[0], np.argmin(np.abs(y))
+    apart = data["contact_y_right"][middle] - data["contact_y_left"][middle]
+    index = data["steering_index"]
+    assert index["value"] == pytest.approx(
+        apart * min(radii) / index["radius"] / -data["delta_r"][i], rel=1e-6
+    )
+
+
+@pytest.mark.usefixtures("small_contact_tables")
 @pytest.mark.further
 def test_what_was_put_right_in_a_file_is_told(tmp_path, capsys):
     profile = load_profile("S1002")
