@@ -14,6 +14,7 @@ from railsim.contact import contact_geometry
 from railsim.contact.gauges import gauge_table, wheel_gauge
 from railsim.contact.summary import Pair
 from railsim.contact.tables import printed_conicity
+from railsim.plot.contact import profiles_figure
 from railsim.profiles import Profile, load_profile
 
 NAMES = (
@@ -64,6 +65,23 @@ def test_pictures_of_a_contact_name_the_inclination_of_the_rail():
     profiles = load_profile("S1002"), load_profile("60E1")
     for inclination, words in ((0.025, "1:40"), (0.05, "1:20"), (0.0, "upright")):
         assert Pair(*profiles, 1.435, inclination, 1.36).words == f"S1002 on 60E1 {words}"
+
+
+def test_picture_of_profiles_joins_points_of_wheels_and_rails():
+    """Left and right mirror each other; every line ends on the contour of a wheel and a rail."""
+    profiles = load_profile("S1002"), load_profile("60E1")
+    pair, y = Pair(*profiles, 1.435, 0.025, 1.36), 1e-3 * np.arange(-6.0, 6.5)
+    figure = profiles_figure(contact_geometry(*profiles, lateral=y), (pair, pair))
+    (left, right) = ([line.get_xydata() for line in axes.lines] for axes in figure.axes)
+    for one, other in zip(left[:2], right[:2], strict=True):
+        np.testing.assert_allclose(one * [-1.0, 1.0], other, atol=1e-9)
+    rail, wheel, *joined = right
+    assert len(joined) == len(y)
+    for ends in joined:
+        for (at, height), contour in zip(ends, (wheel, rail), strict=True):
+            near = contour[np.argsort(np.abs(contour[:, 0] - at))[:6]]
+            assert near[:, 1].min() - 0.05 <= height <= near[:, 1].max() + 0.05
+    assert np.all(np.ptp([ends[:, 0] for ends in joined], axis=1) < 8.0)
 
 
 @pytest.mark.usefixtures("small_contact_tables")

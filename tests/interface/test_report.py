@@ -27,7 +27,16 @@ from railsim.compare import differing, flat_keys
 from railsim.definitions import Settings
 from railsim.definitions.units_of_keys import unit_of_input, unit_of_key
 from railsim.definitions.vehicle.laws import Signal
-from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
+from railsim.report.curves import (
+    CELLS,
+    MISSING,
+    MOST_VALUES,
+    cells_of,
+    coded,
+    curve_data,
+    groups,
+    thinned,
+)
 from railsim.report.document import day
 from railsim.report.drawings import track_svg
 from railsim.report.inputs import _settings, inputs_of, what_was_run
@@ -557,6 +566,14 @@ def test_coded_values_are_right_to_half_a_step():
     assert codes[2] == MISSING
     back = low + codes[[0, 1, 3]] * (high - low) / (MISSING - 1)
     assert back == pytest.approx(values[0, [0, 1, 3]], abs=0.5 * 11.0 / (MISSING - 1))
+
+
+def test_curves_are_thinned_by_the_run_with_most_wheelsets():
+    """Two bytes for each of nine curves a wheelset, smallest and largest value of every cell."""
+    single, long = SimpleNamespace(wheelsets=["1"]), SimpleNamespace(wheelsets=[*"12345678"])
+    for runs in ({"a": single, "b": long}, {"a": long, "b": single}):
+        assert cells_of([runs]) == min(CELLS, MOST_VALUES // (2 * 2 * 8 * 9))
+    assert cells_of([{str(k): long for k in range(40)}] * 2) == MOST_VALUES // (2 * 80 * 8 * 9)
 
 
 def test_runs_over_other_tracks_are_drawn_apart():

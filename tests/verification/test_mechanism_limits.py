@@ -15,6 +15,7 @@ from railsim.mechanisms.dynamics import free_motion
 from railsim.mechanisms.model import build
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
+from railsim.mechanisms.summary import published_data
 from railsim.mechanisms.tables import comparison_table, published_table, sentences
 from railsim.mechanisms.targets import positions
 from railsim.mechanisms.tolerance import scatter
@@ -430,9 +431,19 @@ mass = [50.0, 150.0]
     assert by_name(result)["available_force"].unit == "N m"
     assert {one.unit for one in scatter(result.definition)} == {"N m"}
     assert "981 N m" in str(published_table(result))
+    assert published_data(result)["max_force"]["published"] == 981.0
     assert "largest force (N m)" in str(comparison_table([result, result]))
     by_force = analyse(load_mechanism("tilting_one_spring"))
     assert "largest force (N or N m)" in str(comparison_table([result, by_force]))
+
+
+def test_published_values_stand_beside_the_published_parameters_only(arm, tmp_path):
+    more = "\n[published]\nmax_force = 981.0\n[cases.light]\nmass = 50.0\n"
+    definition = arm(TORQUE, 0.0, more=more)
+    assert published_data(analyse(definition))
+    assert not published_data(analyse(definition, case="light"))
+    changed = load_mechanism(tmp_path / "arm.toml", ["parameters.mass=90.0"])
+    assert not published_data(analyse(changed))
 
 
 def test_the_contact_force_counts_everywhere_in_the_zone(arm):
