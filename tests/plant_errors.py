@@ -8,7 +8,9 @@ until one fails, then the file is put back.  The list holds place, change, and t
 failed, or `survived`; what stands in a list is not tried again.  `--kernels` limits the errors in
 kernels, each of which compiles for minutes: further errors of the seed elsewhere take their place.
 `--rooms springs,stability,wear` takes as many of each folder, or of files with this in their name.
-Run it in a clone of its own: it changes sources.
+`--coverage .coverage` runs the tests that execute the line in place of the nearest files, `--most`
+of them, as `pytest -n 2 --cov=railsim --cov-context=test` has recorded them (of kernels nothing is).
+Run it in a clone of its own, with the extra `cov`: it changes sources.
 
 Mutation operators after DeMillo, Lipton and Sayward (1978), "Hints on test data selection".
 """
@@ -24,6 +26,8 @@ import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from coverage import CoverageData
 
 ROOT = Path(__file__).resolve().parents[1]
 SWAPPED = {
@@ -113,8 +117,36 @@ def tests_of(path: str, count: int) -> list[str]:
     return list(dict.fromkeys([*best[:count], *physics[:count]]))
 
 
-def first_failure(planted: Planted, files: int) -> str:
-    """The first test that fails with the error in place, or `survived`."""
+def tests_at(planted: Planted, data: CoverageData, most: int) -> list[str]:
+    """Tests that execute a line of the changed statement, of a constant any line of its module.
+
+    `most` of them: half nearest by their files, half at random.
+    """
+    path = ROOT / planted.path
+    statements = [
+        node
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.stmt) and node.lineno <= planted.line <= node.end_lineno
+    ]
+    inner = max(statements, key=lambda node: node.lineno)
+    end = inner.body[0].lineno - 1 if isinstance(getattr(inner, "body", None), list) else 0
+    lines = range(inner.lineno, max(end or inner.end_lineno, inner.lineno) + 1)
+    (measured,) = [file for file in data.measured_files() if file.endswith(f"/{planted.path}")]
+    by_line = data.contexts_by_lineno(measured)
+    found = {name for line in lines for name in by_line.get(line, ()) if name}
+    found = found or {name for names in by_line.values() for name in names if name}
+    near = tests_of(planted.path, 8)
+    rank = {file: k for k, file in enumerate(near)}
+    tests = sorted({name.split("|")[0] for name in found})
+    tests.sort(key=lambda name: rank.get(name.split("::")[0], len(near)))
+    if len(tests) > most:
+        rest = random.Random(1).sample(tests[most // 2 :], most - most // 2)
+        tests = [*tests[: most // 2], *rest]
+    return tests
+
+
+def first_failure(planted: Planted, tests: list[str]) -> str:
+    """The first of some tests that fails with the error in place, or `survived`."""
     path = ROOT / planted.path
     source = path.read_text()
     lines = source.splitlines(keepends=True)
@@ -125,7 +157,7 @@ def first_failure(planted: Planted, files: int) -> str:
     try:
         path.write_text("".join(lines))
         run = subprocess.run(
-            [*command, planted.path, *tests_of(planted.path, files)],
+            [*command, *tests],
             cwd=ROOT, capture_output=True, text=True, timeout=SECONDS_PER_ERROR,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
@@ -158,6 +190,8 @@ def main() -> None:
     parser.add_argument("--kernels", type=int, help="at most so many in railsim/kernels")
     parser.add_argument("--rooms", type=lambda text: text.split(","), help="of these alone")
     parser.add_argument("--files", type=int, default=10, help="test files for each error")
+    parser.add_argument("--coverage", type=Path, help="which tests execute which lines")
+    parser.add_argument("--most", type=int, default=300, help="tests for each error by --coverage")
     parser.add_argument("--list", type=Path, default=ROOT / "build" / "planted.csv")
     options = parser.parse_args()
     if options.rooms:
@@ -170,6 +204,9 @@ def main() -> None:
     kernels = [planted for planted in chosen if planted.path.startswith("railsim/kernels/")]
     left_out = set() if options.kernels is None else set(kernels[options.kernels :])
     chosen = [planted for planted in chosen if planted not in left_out][: options.count]
+    if options.coverage:
+        data = CoverageData(str(options.coverage))
+        data.read()
     options.list.parent.mkdir(parents=True, exist_ok=True)
     done = options.list.read_text() if options.list.exists() else ""
     with options.list.open("a", newline="") as file:
@@ -178,7 +215,11 @@ def main() -> None:
             place = [planted.path, str(planted.line), planted.was, planted.now]
             if ",".join(place) in done:
                 continue
-            result = first_failure(planted, options.files)
+            if options.coverage and planted not in kernels:
+                tests = tests_at(planted, data, options.most)
+            else:
+                tests = [planted.path, *tests_of(planted.path, options.files)]
+            result = first_failure(planted, tests)
             writer.writerow([*place, result])
             file.flush()
             print(*place, result, flush=True)

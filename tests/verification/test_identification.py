@@ -699,7 +699,7 @@ def test_a_run_is_prepared_with_its_lead_its_speeds_and_the_noise_in_the_band(tm
         assert one.start == pytest.approx(start + run.distance[0] * (start > 0.0))
         assert one.at[0] == pytest.approx(max(first, one.start + 2.0 * SPEED), abs=0.2)
     prepared(run.part(50.0, 50.0 + 4.02 * SPEED).moved(150.0), model, (0.5, 14.0), long)
-    with pytest.raises(railsim.InputError, match="distance: 79 m .* 80 m at least"):  # 4 s
+    with pytest.raises(railsim.InputError, match=r"distance: 79 m .* 80 m at least"):  # 4 s
         prepared(run.part(50.0, 50.0 + 3.97 * SPEED).moved(150.0), model, (0.5, 14.0), long)
     for wave, mode in ((0.009, "constant"), (0.011, "table")):  # from the least to the largest
         speed = SPEED * (1.0 + 0.5 * wave * np.cos(2.0 * np.pi * np.arange(len(run.time)) / 400.0))
