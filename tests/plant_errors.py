@@ -9,7 +9,7 @@ failed, or `survived`; what stands in a list is not tried again.  `--kernels` li
 kernels, each of which compiles for minutes: further errors of the seed elsewhere take their place.
 `--rooms springs,stability,wear` takes as many of each folder, or of files with this in their name.
 `--coverage .coverage` runs the tests that execute the line in place of the nearest files, `--most`
-of them, as `pytest -n 2 --cov=railsim --cov-context=test` has recorded them (of kernels nothing is).
+of them, as recorded by `pytest -n 2 --cov=railsim --cov-context=test` (of kernels nothing is).
 Run it in a clone of its own, with the extra `cov`: it changes sources.
 
 Mutation operators after DeMillo, Lipton and Sayward (1978), "Hints on test data selection".
