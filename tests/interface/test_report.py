@@ -42,7 +42,7 @@ from railsim.report.drawings import track_svg
 from railsim.report.inputs import _settings, inputs_of, what_was_run
 from railsim.report.limits import assessed
 from railsim.report.published import beside_published, reading
-from railsim.report.runs import _peaks, page
+from railsim.report.runs import _lead, _peaks, page
 from railsim.report.spread import columns, command, parameters, spread_rows, worst_rows, worst_runs
 from railsim.result import Hdf5Sink, peaks
 from railsim.result.export import selected
@@ -566,6 +566,20 @@ def test_coded_values_are_right_to_half_a_step():
     assert codes[2] == MISSING
     back = low + codes[[0, 1, 3]] * (high - low) / (MISSING - 1)
     assert back == pytest.approx(values[0, [0, 1, 3]], abs=0.5 * 11.0 / (MISSING - 1))
+
+
+@pytest.mark.parametrize(
+    ("vehicles", "words"),
+    [
+        ("a", "vehicle a"),
+        ("abcd", "vehicles a, b, c, d"),
+        ("abcde", "5 vehicles"),
+    ],
+)
+def test_the_head_of_a_page_names_few_vehicles_and_counts_many(vehicles, words):
+    records = [{"labels": {"vehicle": name, "track": "t"}} for name in vehicles]
+    number = f"{len(vehicles)} run{'s' * (len(vehicles) > 1)}"
+    assert _lead(records, {}) == f"{number}; {words}; track t."
 
 
 def test_curves_are_thinned_by_the_run_with_most_wheelsets():

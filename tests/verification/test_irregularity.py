@@ -470,6 +470,23 @@ def test_standard_deviation_of_a_spectrum_is_the_published_one(name, channel, mm
 
 
 @pytest.mark.parametrize(
+    ("channel", "base", "printed"),
+    [
+        ("vertical", 1.0, (1.1029, -1.4709, 0.5941, 0.8480, 3.8016, -0.2500, 0.0112)),
+        ("lateral", 1.0, (0.2244, -1.5746, 0.6683, -2.1466, 1.7665, -0.1506, 0.0052)),
+        ("cross_level", 1.5, (0.1214, -2.1603, 2.0214, 4.5089, 2.2227, -0.0396, 0.0073)),
+    ],
+)
+def test_spectra_of_chinese_trunk_lines_are_the_printed_fractions(channel, base, printed):
+    """S = A (f2 + B f + C)/(f4 + D f3 + E f2 + F f + G) in mm2/(1/m), a height over 1.5 m."""
+    A, B, C, *lower = printed
+    f = np.array([1.0 / 70.0, 0.1, 1.0 / 3.0])
+    printed = 1e-6 * A * np.polyval([1.0, B, C], f) / np.polyval([1.0, *lower], f)
+    found = SPECTRA["china_trunk"].density(channel, 2.0 * np.pi * f)
+    assert found * 2.0 * np.pi * base**2 == pytest.approx(printed, rel=1e-12)
+
+
+@pytest.mark.parametrize(
     ("channel", "A", "f1", "f2"), [("cross_level", 0.7197, 0.0233, 0.1312),
                                    ("gauge", 0.5927, 0.0292, 0.2329)],
 )  # fmt: skip

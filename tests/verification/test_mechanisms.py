@@ -326,6 +326,30 @@ def test_a_cubic_through_the_four_rows_of_a_table_is_its_law():
         load_mechanism("tilting_two_springs", ["motion.law=table", f"motion.table={rows[1:]}"])
 
 
+def test_a_spring_is_drawn_from_pin_to_pin_as_wide_as_a_part_of_its_first_length(tmp_path):
+    path = tmp_path / "arm.toml"
+    path.write_text(
+        'format = "railsim-mechanism/1"\n'
+        "[ground]\npoints = { pin = [0, 0], foot = [-0.3, -0.5] }\n"
+        "[bodies.arm]\npoints = { pin = [0, 0], end = [1, 0] }\nmass = 3.0\n"
+        '[joints.pin]\nrevolute = ["ground.pin", "arm.pin"]\n'
+        '[elements.coil]\nspring = ["ground.foot", "arm.end"]\n'
+        "stiffness = 1e3\nfree_length = 1.0\n"
+        '[driver]\nangle = "arm"\nstart = 0.2\nend = 1.8\n'
+    )
+    model = build(load_mechanism(path))
+    motion = solve(model, np.linspace(model.start, model.end, 11))
+    (coil,) = [line.xy for line in lines(motion) if line.kind == "spring"]
+    ends = np.stack((np.cos(motion.s), np.sin(motion.s)), axis=-1)
+    np.testing.assert_allclose(coil[:, 0], np.broadcast_to([-0.3, -0.5], ends.shape), atol=1e-12)
+    np.testing.assert_allclose(coil[:, -1], ends, atol=1e-12)
+    along = ends - coil[:, 0]
+    length = np.hypot(*along.T)
+    beside = np.abs(np.einsum("ik,ijk->ij", along[:, ::-1] * [-1, 1], coil - coil[:, :1]))
+    width = np.max(beside, axis=1) / length
+    assert width == pytest.approx(np.full(11, length[0] / 24.0), rel=1e-9)
+
+
 @pytest.mark.parametrize("lift", [1, 2, 3])
 def test_the_line_of_a_slot_holds_its_pin_at_every_position(motions, lift):
     """The pin lies on the line, which keeps its length and is as much too long at both ends."""
