@@ -570,11 +570,7 @@ def test_coded_values_are_right_to_half_a_step():
 
 @pytest.mark.parametrize(
     ("vehicles", "words"),
-    [
-        ("a", "vehicle a"),
-        ("abcd", "vehicles a, b, c, d"),
-        ("abcde", "5 vehicles"),
-    ],
+    [("a", "vehicle a"), ("abcd", "vehicles a, b, c, d"), ("abcde", "5 vehicles")],
 )
 def test_the_head_of_a_page_names_few_vehicles_and_counts_many(vehicles, words):
     records = [{"labels": {"vehicle": name, "track": "t"}} for name in vehicles]
