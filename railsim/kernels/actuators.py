@@ -38,8 +38,9 @@ from railsim.kernels.vectors import (
 )
 
 # columns of Actuators.which: along the line, along an axis or about one; what the command is;
-# internal state of the lag, else -1; where in `Work.memory` the last command stands, where those on
-# their way and how many of them; law and its block, first of its states and their number
+# internal state of the lag, else -1; where in `Work.memory` the last command stands, behind it the
+# largest, where those on their way and how many of them; law and its block, first of its states and
+# their number
 ACTION, MODE, LAG_STATE, COMMAND, QUEUE, SLOTS, LAW, BLOCK, OWN_STATE, OWN_STATES = range(10)
 WHICH_SIZE = 10
 # values of ACTION: the line, three axes along which it acts, three about which, axle of body 2
@@ -90,6 +91,7 @@ def send(actuators, memory, i, value, time):
         memory[k], memory[k + 1] = time, value
         memory[queue] = count + 1
     memory[at] = value
+    memory[at + 1] = max(memory[at + 1], value)
     return True
 
 

@@ -81,8 +81,8 @@ class LawBlocks:
         return len(self.memory) - len(values)
 
     def command(self, delay: float, apart: float = SLOT) -> tuple[int, int, int]:
-        """Place of a command, of those on their way and how many of them there may be."""
-        place, slots = self.room([0.0]), 0
+        """Place of last and largest command, of those on their way, how many these may be."""
+        place, slots = self.room([0.0, 0.0]), 0
         if delay > 0.0:
             slots = math.ceil(delay / min(apart, SLOT)) + 4
         return place, self.room([0.0] * (1 + 2 * slots)) if slots else -1, slots

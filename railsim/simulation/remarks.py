@@ -255,15 +255,16 @@ def alternation(measured: Floats, Q0: Floats, wheelsets: Sequence[str], divided:
 
 
 def commanded_dampers(system: System, names: Sequence[str], memory: Floats, step: float) -> str:
-    """Remark on a damper whose last command is too large for the step [s], chosen without it."""
+    """Remark on a damper with a command too large for the step [s], chosen without commands."""
     acts, bodies = system.actuators, system.bodies
     for i in np.flatnonzero(acts.which[:, MODE] == BY_DAMPER).tolist():
         about, of, unit = acts.which[i, ACTION] - ABOUT, bodies.mass, "N s/m"
         if about >= 0:  # x, y, z or an axle
             of, unit = bodies.inertia[:, (0, 1, 2, 1)[about]], "N m s"
-        if step * (constant := memory[acts.which[i, COMMAND]]) > COMMANDED * of[acts.body[i]].min():
+        constant = memory[acts.which[i, COMMAND] + 1]
+        if step * constant > COMMANDED * of[acts.body[i]].min():
             return (
-                f"The damper {names[i]} was commanded {constant:.3g} {unit} at the end. The step "
+                f"The damper {names[i]} was commanded up to {constant:.3g} {unit}. The step "
                 f"of {1e3 * step:.3g} ms was chosen without commands, and the force of such a "
                 "damper may alternate from step to step: compare with half the step (--check-step)."
             )
