@@ -22,7 +22,7 @@ from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.laws.binding import Takes, bind
 from railsim.model.assembly import Model
 from railsim.model.element_arrays import SLOT, LawBlocks
-from railsim.notation import COMPONENTS
+from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED
 
 OF_POINTS = kernel.POINT_POSITION, kernel.POINT_VELOCITY, kernel.POINT_ACCELERATION
 OF_BODY = dict(zip(BODY_SIGNALS, (*OF_POINTS, kernel.BODY_ANGLE, kernel.BODY_RATE), strict=True))
@@ -60,12 +60,17 @@ def periods(vehicle: Vehicle) -> list[float]:
 def with_control(model: Model, vehicle: Vehicle, settings: Settings) -> Model:
     """Return the model with the vehicle's signals and controllers.
 
-    Raises InputError: names that mean nothing; a law that is not permitted or cannot be compiled; a
-    step of the settings that is longer than a controller's period.
+    Raises InputError: names that mean nothing or two things; a law that is not permitted or cannot
+    be compiled; a step of the settings that is longer than a controller's period.
     """
     if not vehicle.signals and not vehicle.controllers:
         return model
     wiring = _Wiring(model, vehicle)
+    quantities = {*QUANTITIES, *REQUESTED, *(settings.outputs.own or {})}
+    for name, signal in (vehicle.signals or {}).items():
+        same = name == signal.quantity and name in QUANTITIES and signal.side is None
+        if name in quantities and not same:  # `Simulation.read` knows both by their names
+            wiring.fault(f"signals.{name}", "the name of a quantity of results", "another name")
     for name, controller in (vehicle.controllers or {}).items():
         if settings.step is not None and controller.period < settings.step * (1.0 - 1e-9):
             found = f"found {controller.period:.12g} s, shorter than the step of the settings"

@@ -224,6 +224,8 @@ class Simulation:
         check_numbers(until=until, duration=duration)
         if until is None and duration is None:
             self._to_the_end()
+        elif until is not None and duration is not None:
+            raise argument_error("duration", "given together with `until`", "one of the two")
         elif until is None:
             return self.step(duration)
         elif math.isnan(until):
@@ -403,6 +405,8 @@ class Simulation:
         """
         signals = self._run.prepared.model.index.signals
         values = self._present()
+        if name == "Q0":  # which has no dimension of time
+            return self._run.prepared.balance.Q0.copy()
         if name in signals:
             base = self._run.system.signals.which[signals.index(name), BASE]
             return float(self._probe[0].memory[base + VALUE])

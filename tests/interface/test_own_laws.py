@@ -326,6 +326,31 @@ def test_keys_of_a_signal_that_its_quantity_does_not_use_are_refused(key, value,
         Signal.model_validate(wheel)
 
 
+@pytest.mark.parametrize(
+    ("name", "signal"),
+    [
+        ("Q", {"quantity": "Q", "wheelset": "front.outer.wheelset", "side": "left"}),
+        ("element_force", {"quantity": "speed"}),
+        ("half_way", {"quantity": "speed"}),
+        ("distance", {"quantity": "time"}),
+    ],
+)
+def test_a_signal_hides_no_quantity_of_its_name(coach, track, name, signal):
+    own = {"half_way": {"law": "half", "inputs": {"x": "distance"}}}
+    half = {"half": {"source": SOURCE, "file": "mine.py"}}
+    settings = railsim.Settings(outputs={"own": own}, laws=half)
+    vehicle = coach.replace(signals={name: signal})
+    with pytest.raises(InputError, match=f"signals.{name}: the name of a quantity of results"):
+        railsim.Simulation(vehicle, track, speed=20.0, settings=settings)
+
+
+def test_a_signal_may_have_the_name_of_what_it_measures(coach, track):
+    vehicle = coach.replace(signals={"distance": {"quantity": "distance"}})
+    with railsim.Simulation(vehicle, track, speed=20.0, until=1.0) as sim:
+        sim.step(0.01)
+        assert sim.read("distance") == sim.distance
+
+
 CONTROLLER = binding.Takes("a controller", ("time",), ("v",))
 
 

@@ -121,6 +121,18 @@ def test_what_is_read_is_what_is_recorded(coach, track):
         assert np.array_equal(result[name][at], value)
 
 
+def test_all_that_is_readable_can_be_read_before_the_first_step(coach, track):
+    with railsim.Simulation(coach, track, speed=20.0, duration=0.1) as sim:
+        seen = {name: sim.read(name) for name in sim.readable}
+        while sim.step():
+            pass
+        result = sim.result()
+    assert {"Q", "Q0", "time"} <= seen.keys()
+    for name, value in seen.items():
+        recorded = result[name]
+        assert np.array_equal(recorded if name == "Q0" else recorded[0], value), name
+
+
 def test_a_state_restored_has_the_same_bits(coach, track):
     vehicle = commanded(coach, delay=0.03)
     sim = railsim.Simulation(vehicle, track, speed=20.0, settings=DISTURBED, record=False)
@@ -248,6 +260,7 @@ def test_faults_are_one_line_each(coach, track):
         (lambda: sim.set("push", float("nan")), "value: found nan"),
         (lambda: sim.step(-1.0), "dt: found -1.0 s"),
         (lambda: sim.read("R"), "nothing is called 'R'"),
+        (lambda: sim.run(until=5.0, duration=1.0), "duration: given together with `until`"),
         (lambda: sim.read("element_force"), "settings.outputs"),
     ):
         with pytest.raises(InputError, match=words):
