@@ -4,14 +4,14 @@ import json
 import keyword
 import re
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import changed_faults, input_error, optional_package
+from railsim.errors import argument_error, changed_faults, input_error, optional_package
 from railsim.files.access import check_file, whole_file
 from railsim.fmi.unit import INPUTS, VARIABLES
 from railsim.model.control import check_command
@@ -81,6 +81,7 @@ def fmu(
         facts |= {key: conditions.get(key) for key in ("duration", "until")}
         facts["inputs"] = _commands(vehicle, actuators, inputs)
         facts["outputs"] = _variables(vehicle, result, signals, outputs)
+        _check_names(facts)
         variables = Path(folder) / VARIABLES
         variables.write_text(json.dumps(facts, indent=1, default=float), encoding="utf-8")
         script.write_text(WRAPPER.format(name=name, version=__version__), encoding="utf-8")
@@ -95,6 +96,17 @@ def _identifier(stem: str) -> str:
     """Return the name of a class and of a file for the name of a unit."""
     name = re.sub(r"\W", "_", stem, flags=re.ASCII)
     return f"unit_{name}" if not name or name[0].isdigit() or keyword.iskeyword(name) else name
+
+
+def _check_names(facts: Mapping[str, Any]) -> None:
+    """Raise InputError where two variables of the unit have one name (FMI 3.0, 2.4.7)."""
+    known = {"time": "a variable of every unit", "status": "a variable of every unit"}
+    for kind in ("inputs", "outputs"):
+        for one in facts[kind]:
+            if one["name"] in known:
+                found = f"'{one['name']}' is the name of {known[one['name']]}"
+                raise argument_error(kind, found, "names that differ", option=f"--{kind}")
+            known[one["name"]] = f"one of its {kind}"
 
 
 def _commands(

@@ -285,6 +285,20 @@ def test_wrong_variables_are_input_errors(active, track, tmp_path, change, words
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("signal", "words"),
+    [
+        ("status", "outputs: 'status' is the name of a variable of every unit"),
+        ("time", "outputs: 'time' is the name of a variable of every unit"),
+        ("push", "outputs: 'push' is the name of one of its inputs"),
+    ],
+)
+def test_names_of_variables_are_unique(active, track, tmp_path, signal, words):
+    vehicle = active.replace(signals={signal: {"quantity": "time"}})
+    with pytest.raises(InputError, match=words):
+        fmu(vehicle, track, tmp_path / "coach.fmu", **WAY, outputs=[signal])
+
+
 def test_inputs_of_a_unit_are_not_what_a_controller_commands(active, track, tmp_path):
     """A command of 0 from the program would replace the controller's at each step."""
     pull = {**dict(active.elements)["push"].model_dump(exclude_none=True), "delay": 0.1}
