@@ -6,6 +6,7 @@ their names with their dimensions, and ``units``, names and facts of the run as 
 """
 
 import csv
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from railsim.result.labels import all_labels
 
 ENDINGS = (".csv", ".mat", ".parquet")
 ROWS_AT_ONCE = 4096
+MATLAB_NAME = re.compile(r"(?!(names|run|units)$)[A-Za-z][A-Za-z0-9_]{0,62}")
 MOST_INSTANTS = 10_000_000  # of an export at equal times
 POSITIONS = ("time", "distance", "mileage", "wheelset_distance")  # quantities that are not filtered
 
@@ -33,8 +35,8 @@ def export(
 
     `quantities`: Columns of CSV and Parquet, such as ``Y:1:left``; by default all. Raises
     InputError: the file exists and may not be overwritten, its ending is none of `ENDINGS`, what
-    writes it is not installed, it is a MATLAB file and a part of a quantity is asked for, or none
-    and a quantity is asked for that is no function of time.
+    writes it is not installed, it is a MATLAB file and a part of a quantity is asked for or one
+    whose name it cannot hold, or none and a quantity is asked for that is no function of time.
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=ENDINGS)
@@ -44,6 +46,10 @@ def export(
                 allowed = "a MATLAB file holds whole quantities; CSV and Parquet hold columns"
                 found = "a part of a quantity"
                 raise argument_error("quantities", found, allowed, labelled[0], "QUANTITY")
+            if strange := [name for name in result if not MATLAB_NAME.fullmatch(name)]:
+                found = "no name of a MATLAB file"
+                allowed = "63 letters, digits and _ at most, a letter first, not names, run, units"
+                raise argument_error("quantities", found, allowed, strange[0], "QUANTITY")
             _matlab(result, partial)
         else:
             dims = {q: result.quantities[q.partition(":")[0]].dims for q in quantities}

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tracemalloc
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -20,8 +21,8 @@ import railsim
 from railsim.cli import main
 from railsim.errors import InputError
 from railsim.notation import QUANTITIES
-from railsim.result import MemorySink, open_run
-from railsim.result.export import export
+from railsim.result import MemorySink, Result, open_run
+from railsim.result.export import export, selected
 from railsim.result.hdf5 import Storage, write
 
 RUN = "coach_manchester_curve_r250_10"
@@ -223,6 +224,25 @@ def test_export_to_csv_and_matlab_holds_every_value(tmp_path):
     assert data["units"]["Q"].item() == "N"
     assert data["names"]["side"].item().tolist() == ["left", "right"]
     assert data["run"]["status"].item() == "complete"
+
+
+@pytest.mark.parametrize("name", ["_x", "a-b", "run", "units", "names", "u" * 64])
+def test_a_name_that_matlab_files_cannot_hold_is_refused(tmp_path, name):
+    """A letter, then letters, digits, underscores, 63 at most; some names the file has itself."""
+    result = example_result(duration=1.0)
+    quantity = replace(result.quantities["distance"], name=name)
+    own = Result(
+        {**{q: result[q] for q in result}, name: result["distance"]},
+        {**result.quantities, name: quantity},
+        result.coordinates,
+        result.attributes,
+        result.profiles,
+    )
+    with pytest.raises(InputError, match=f"{name}: no name of a MATLAB file"):
+        export(own, tmp_path / "r.mat")
+    assert list(tmp_path.iterdir()) == []
+    assert export(own, tmp_path / "r.csv").exists()
+    assert "Q" in loadmat(export(selected(own, ["Q"]), tmp_path / "r.mat"))
 
 
 def test_export_command_names_its_formats(tmp_path, capsys):
