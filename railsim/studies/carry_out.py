@@ -13,6 +13,9 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
+import h5py
+import numpy as np
+
 from railsim.errors import (
     Fault,
     Faults,
@@ -196,6 +199,12 @@ def _refuse_files_of_others(folder: Path, beside: Sequence[str]) -> None:
     raise argument_error("out", found, allowed, key=str(folder / name))
 
 
+def _is_single(path: Path) -> bool:
+    """Whether the numbers of a result file have 4 bytes (`Storage.single`)."""
+    with h5py.File(path) as file:
+        return any(getattr(one, "dtype", None) == np.float32 for one in file.values())
+
+
 def _is_newer(one: Path, other: Path) -> bool:
     try:
         return one.stat().st_mtime_ns >= other.stat().st_mtime_ns
@@ -274,7 +283,7 @@ class State:
                 known = self._known(case)
                 if self._lacks(case, result, known):
                     self._reduced.append(case.name)
-                    found = "a result without all quantities of this study"
+                    found = "a result without all quantities or digits of this study"
                     return [argument_fault("out", str(path), found, CHANGED)]
                 if case.analyses or self._spec.quantities:  # takes time: done as a job like others
                     self.to_be_analysed[case.name] = known
@@ -296,7 +305,12 @@ class State:
         return record if record["inputs_hash"] == case.key else {}
 
     def _lacks(self, case: Case, result: Result, known: Record) -> bool:
-        """Whether a file lacks quantities to be kept, or those of a summary that is not known."""
+        """Whether a file lacks what is to be kept, or what a summary needs that is not known.
+
+        That is quantities, or digits.
+        """
+        if not (self._spec.single and known) and _is_single(self._folder / case.file_name):
+            return True
         outputs = case.settings.outputs
         recorded = {n for n in QUANTITIES if matches(n, outputs.quantities or ("*",))}
         recorded |= {q.name for q in requested(outputs, case.track)} - {"element_command"}
@@ -317,7 +331,7 @@ class State:
         lost = [name for name in gone if name in self._entries and self._entries[name].size]
         for names, words in (
             (self._changed, "of other inputs"),
-            (self._reduced, "without all quantities"),
+            (self._reduced, "without all quantities or digits"),
             (lost, "no longer there"),
         ):
             if names:

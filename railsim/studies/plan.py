@@ -88,6 +88,7 @@ class Plan:
         self._further += [f"analyses {spec.analyses}"] if spec.analyses else []
         self._further += [f"limits {self._limits(one)}" for one in spec.analyses.values()]
         self._further += [f"keep {spec.keep}"] if spec.keep != "all" else []
+        self._further += ["single"] if spec.single else []
         linked = [next(iter(table.values())) for table in spec.linked]
         lists: list[Sequence[object]] = [spec.vehicles, spec.tracks, spec.speeds]
         lists += [*spec.grid.values(), *linked]

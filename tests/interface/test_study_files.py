@@ -122,8 +122,26 @@ def test_reduced_results_do_not_count_as_whole_ones(tmp_path, simulated):
     assert (simulated, remarks) == ([20.0], [])
     railsim.study([COACH], [CURVE], [20.0], resume=True, **how)
     assert simulated == [20.0, 20.0]
-    words = "1 result is without all quantities and computed again"
+    words = "1 result is without all quantities or digits and computed again"
     assert remarks == [f"{words}: {COACH}_{CURVE}_20"]
+
+
+def test_a_single_precision_file_makes_no_summary_and_is_no_whole_result(tmp_path, simulated):
+    """The process is killed between the file of a run and its line in the journal."""
+    how = {"out": tmp_path, "workers": 1, "resume": True}
+    railsim.study([COACH], [CURVE], [20.0], single=True, **how)
+    before = rows(tmp_path)
+    journal = tmp_path / "study.journal"
+    journal.write_bytes(journal.read_bytes().splitlines(keepends=True)[0])
+    railsim.study([COACH], [CURVE], [20.0], single=True, **how)
+    assert simulated == [20.0, 20.0]
+    assert rows(tmp_path) == before
+    railsim.study([COACH], [CURVE], [20.0], single=True, **how)
+    assert simulated == [20.0, 20.0]
+    outcome = railsim.study([COACH], [CURVE], [20.0], **how)
+    assert simulated == [20.0, 20.0, 20.0]
+    (result,) = outcome.results().values()
+    assert np.any(result["Q"] != result["Q"].astype(np.float32))
 
 
 def test_requested_quantities_that_were_not_kept_have_the_run_computed_again(tmp_path):
