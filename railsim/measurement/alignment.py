@@ -91,8 +91,8 @@ def shift_of(
         return None
     middles, shifts, correlations = np.transpose(clear)
     stretch, at_zero = 0.0, np.median(shifts)
-    if len(shifts) > 2:
-        near = np.abs(shifts - at_zero) < max(10 * STEP, 0.01 * np.ptp(middles))
+    near = np.abs(shifts - at_zero) < max(10 * STEP, 0.01 * np.ptp(middles))
+    if np.count_nonzero(near) > 2:
         stretch, at_zero = np.polyfit(middles[near], shifts[near], 1)
     share = float(np.sum(np.abs(shifts - at_zero - stretch * middles) < NEAR)) / len(begins)
     return Shift(float(at_zero), float(stretch), float(np.median(correlations)), len(shifts), share)

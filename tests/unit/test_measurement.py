@@ -12,7 +12,7 @@ from scipy.io import savemat
 
 import railsim
 from railsim.definitions.measurement import MeasurementFile
-from railsim.measurement.alignment import aligned, shift_of
+from railsim.measurement.alignment import aligned, common_shift, shift_of
 from railsim.measurement.clock import clock_of, delayed
 from railsim.measurement.likeness import suspicions
 from railsim.measurement.position import position
@@ -403,6 +403,18 @@ def test_place_and_correlation_do_not_depend_on_an_offset(offset):
     assert found.shift == pytest.approx(-7.0, abs=0.01)
     assert found.stretch == pytest.approx(0.0, abs=1e-6)
     assert found.correlation == pytest.approx(1.0, abs=1e-6)
+
+
+def test_halves_that_are_shifted_apart_have_no_common_shift():
+    """20 m back in one half, 20 m ahead in the other: no window is near the median of all."""
+    s = np.arange(0.0, 1000.0, 0.1)
+    x = np.convolve(np.random.default_rng(4).standard_normal(len(s)), np.ones(50), mode="same")
+    torn = np.where(s < 500.0, np.roll(x, 200), np.roll(x, -200))
+    found = shift_of(s, torn, s, x)
+    assert found.windows >= 4
+    assert found.share <= 0.5
+    assert found.stretch == 0.0
+    assert common_shift([(s, torn, s, x)]) is None
 
 
 @pytest.mark.parametrize("rate", [512.0, 700.0, 800.0, 900.0])
