@@ -24,6 +24,7 @@ from railsim.observation.smoother import Fields
 TAPER = 60.0  # at both ends of a piece [m]
 ALIKE, UNLIKE = 0.3, 3.0  # correlation, ratio of rms values: read, and said by other channels
 BEYOND = 30.0  # power of what does not agree, over that which noise and model explain
+RESTS = 1e-9  # size over that of the channel that moves most
 FEWEST = 3  # channels of which one can be wrong
 MODEL = 0.03  # error of the response over its rms, before the data are asked
 KINDS = ((0, 3), (1, 2))  # components of a wheelset whose unknown accelerations have one size
@@ -139,16 +140,19 @@ def disagreeing(
 ) -> tuple[set[int], list[str]]:
     """Channels that read another thing than the others say, and a remark on each.
 
-    The worst one is left out before the others are looked at again.
+    The worst one is left out before the others are looked at again, a third of those that move at
+    most.
     """
     points = powers.points
     spectra = spectra_of(signals, piece.there, points)
     read = np.fft.irfft(spectra, points, axis=1)
-    left = [c for c in range(len(read)) if piece.there[c].any()]
-    wrong: set[int] = set()
-    said = []
+    size = np.linalg.norm(read, axis=1)
+    wrong = set(np.flatnonzero(piece.there.any(axis=1) & (size < RESTS * size.max())).tolist())
+    left = [c for c in range(len(read)) if piece.there[c].any() and c not in wrong]
+    said = [f"{names[c]} rests: a dead sensor? It is left out." for c in sorted(wrong)]
+    most = len(wrong) + len(left) // 3
     G = powers.fields(Sizes.assumed(len(names))).data_covariance()
-    while len(left) > FEWEST and len(wrong) < len(read) // 3:
+    while len(left) > FEWEST and len(wrong) < most:
         inverse = np.linalg.inv(G[:, left][:, :, left])
         own = np.einsum("kcc->ck", inverse).real
         rest = np.einsum("kcd,dk->ck", inverse, spectra[left], optimize=True) / own

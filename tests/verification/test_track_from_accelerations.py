@@ -343,7 +343,7 @@ def test_files_hold_all_estimates_and_forces_in_their_units(short, tmp_path):
 
 @pytest.mark.further
 def test_gaps_signs_and_units(short, coach):
-    """A gap of 40 m in one axlebox hardly matters; a wrong sign and a wrong unit are said."""
+    """A gap of 40 m hardly matters; wrong signs and units and a dead sensor are said."""
     _, track, measurement, _ = short
     channels = dict(measurement.channels)
     s = measurement.distance
@@ -352,6 +352,7 @@ def test_gaps_signs_and_units(short, coach):
     )
     channels["axlebox_2_right_z"] = -channels["axlebox_2_right_z"]
     channels["axlebox_4_left_z"] = 1e-3 * channels["axlebox_4_left_z"]
+    channels["axlebox_1_right_z"] = np.full_like(s, 0.3)
     found = irregularity(replace(measurement, channels=channels), coach, track, simulations=0)
     said = "\n".join(found.remarks)
     assert "axlebox_2_right_z has the opposite sign" in said
@@ -359,6 +360,7 @@ def test_gaps_signs_and_units(short, coach):
     assert "another 'unit'" in said
     assert "axlebox_3_left_z" not in said
     assert "axlebox_1_left_z" not in said
+    assert "axlebox_1_right_z rests" in said
 
 
 def test_a_curve_without_simulated_runs_is_said_and_spoils_nothing_elsewhere(short, coach):
