@@ -194,12 +194,13 @@ def prepared(
     start = max(0.0, float(thinner.distance[0]) - LEAD)
     begin = max(start + FORGET * mean, float(thinner.distance[0]))
     end = min(track.length, float(thinner.distance[-1]))
+    step = 1.0 / thinner.rate
     thinner = thinner.part(begin, end - 1e-9)
-    if len(thinner.time) < SHORTEST * thinner.rate:
+    if len(thinner.time) * step < SHORTEST:
         found = f"{max(0.0, end - begin):.0f} m on the track of {track.length:.0f} m"
         allowed = f"{SHORTEST * mean:.0f} m at least, {FORGET:g} s after the start of the run"
         raise input_error(measurement.name, found, allowed, key="distance")
-    f = np.fft.rfftfreq(len(thinner.time), 1.0 / thinner.rate)
+    f = np.fft.rfftfreq(len(thinner.time), step)
     if (number := int(np.sum((f >= band[0]) & (f <= high)))) < FEWEST:
         found = f"{band[0]:g} to {high:g} Hz: {number} frequencies, {f[1]:.3g} Hz apart"
         allowed = f"{FEWEST} at least: a wider band or a longer run"
@@ -223,7 +224,6 @@ def prepared(
     if not np.isfinite(values).any():
         found = "no value where runs are compared"
         raise input_error(measurement.name, found, "values; 'range', 'missing'?", key="channels")
-    step = 1.0 / thinner.rate
     share = np.sqrt(2.0 * (high - band[0]) / measurement.rate)
     noise = np.array([np.nan if c.noise is None else c.noise * share for c in channels])
     return Prepared(run, values, names, noise, step, measurement)

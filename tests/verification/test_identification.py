@@ -693,6 +693,9 @@ def test_a_run_is_prepared_with_its_lead_its_speeds_and_the_noise_in_the_band(tm
     none = replace(run, channels={name: np.nan * x for name, x in run.channels.items()})
     with pytest.raises(railsim.InputError, match="channels: no value where runs are compared"):
         prepared(none, model, (0.5, 14.0), long)  # a vehicle "identified" by nothing was written
+    for seconds in (1.0, 2.5):  # over before anything counts, or soon after
+        with pytest.raises(railsim.InputError, match="2 s after the start of the run"):
+            prepared(run.part(0.0, seconds * SPEED), model, (0.5, 14.0), long)
     for shift, start in ((40.0, 0.0), (150.0, 50.0)):
         one = prepared(run.moved(shift), model, (0.5, 14.0), long).run
         first = shift + run.distance[0]
