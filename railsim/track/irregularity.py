@@ -25,6 +25,7 @@ BEYOND_ROWS = 1.05
 # Least cant and length at which a cross level is held against it, and share of it that is doubtful.
 CANTED, LONG, TWICE = 0.02, 30.0, 0.5  # m, m, 1
 VERSINE = 0.01  # m; mean alignment in a curve that is doubtful
+SMALLEST, ROUGHNESS = 1e-4, 0.1  # m; of a recording, and distance of the rows of rougher rails
 LARGEST = 0.5  # m; of a law of one's own
 
 
@@ -84,7 +85,7 @@ def measured_remarks(track: Track) -> list[str]:
     """Remark on records between whose rows the rails go further than at them, on gaps and curves.
 
     Further by 5 % or more; gaps of five steps or more, or of 30 m at an end of the track; cant or
-    versines in the record.
+    versines in the record; less than 0.1 mm in all of it.
     """
     remarks = []
     for index, part in enumerate(track.irregularities):
@@ -97,19 +98,32 @@ def measured_remarks(track: Track) -> list[str]:
                 f"{column} reaches {1e3 * between:.3g} mm at s = {s:.1f} m, "
                 f"the largest row is {1e3 * at_rows:.3g} mm."
             )
-        remarks += _gap_remarks(part, index) + _held_remarks(part, index, track)
+        remarks += _size_remarks(part, index) + _gap_remarks(part, index)
+        remarks += _held_remarks(part, index, track)
     ends = [
         part.extent(track.length)
         for part in track.irregularities
         if isinstance(part, Measured) and len(part.rows or ()) >= RECORDED
     ]
     low, high = min((a for a, _ in ends), default=0.0), max((b for _, b in ends), default=np.inf)
-    if LONG < low < track.length or 0.0 < high < track.length - LONG:
+    if low > LONG or high < track.length - LONG:
         remarks.append(
             f"What is recorded goes from s = {low:.0f} to {high:.0f} m of the {track.length:.0f} m "
             "of the track: elsewhere it moves no rail."
         )
     return remarks
+
+
+def _size_remarks(part: Measured, index: int) -> list[str]:
+    """Remark on a record smaller than that of any track, unless its rows follow short waves."""
+    rows = np.array(part.rows or ())
+    largest = abs(part.scale) * float(np.abs(rows[:, 1:]).max())
+    if len(rows) < RECORDED or largest >= SMALLEST or np.median(np.diff(rows[:, 0])) < ROUGHNESS:
+        return []
+    return [
+        f"irregularities.{index} moves the rails by {1e3 * largest:.2g} mm at most, less than any "
+        "track does: another unit?"
+    ]
 
 
 def _gap_remarks(part: Measured, index: int) -> list[str]:

@@ -692,6 +692,20 @@ def test_missing_rows_are_remarked_on(tmp_path):
     assert measured_remarks(recorded(tmp_path, written(s[few], z[few]))) == []
     (remark,) = measured_remarks(recorded(tmp_path, written(s, z), shift=-30.0))
     assert remark.startswith("What is recorded goes from s = -30 to 60 m of the 100 m of the track")
+    for shift, words in ((5000.0, "5000 to 5090 m"), (-5000.0, "-5000 to -4910 m")):
+        (remark,) = measured_remarks(recorded(tmp_path, written(s, z), shift=shift))
+        assert remark.startswith(f"What is recorded goes from s = {words} of the 100 m")
+
+
+def test_a_recording_smaller_than_any_track_is_remarked_on(tmp_path):
+    """Values in m under a name in mm; the roughness of rails is as small, in rows close by."""
+    s = np.arange(0.0, 90.0, 0.25)
+    z = 1e-3 * np.sin(2.0 * np.pi * s / 12.0)
+    (remark,) = measured_remarks(recorded(tmp_path, written(s, 1e-3 * z)))
+    assert remark.startswith("irregularities.0 moves the rails by 0.001 mm at most")
+    fine = np.arange(0.0, 90.0, 0.01)
+    rough = 2e-5 * np.sin(2.0 * np.pi * fine / 0.2)
+    assert measured_remarks(recorded(tmp_path, written(fine, rough))) == []
 
 
 @pytest.mark.parametrize(("level", "remarked"), [(80.0, True), (-80.0, True), (8.0, False)])
