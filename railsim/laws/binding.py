@@ -164,6 +164,9 @@ class _Binding:
     def _function(self) -> Any:
         """Execute the text and take the function out of it."""
         name = self.law.function or self.name
+        if self.law.source is None:  # `file` was named in Python, where nobody reads it
+            allowed = "its source, or railsim.laws.law; or a vehicle or track file that names it"
+            self._refuse("is in a file that has not been read", allowed)
         try:
             tree = ast.parse(self.source, self.file)
         except SyntaxError as error:

@@ -326,6 +326,12 @@ def test_keys_of_a_signal_that_its_quantity_does_not_use_are_refused(key, value,
         Signal.model_validate(wheel)
 
 
+def test_the_file_of_a_law_named_in_python_is_not_read(coach, track):
+    vehicle = with_element(coach, law("damper")).replace(laws={"damper": {"file": "mine.py"}})
+    with pytest.raises(InputError, match=r"mine\.py: damper: .* in a file that has not been read"):
+        railsim.simulate(vehicle, track, **WAY, allow_code=True)
+
+
 @pytest.mark.parametrize(
     ("name", "signal"),
     [

@@ -12,7 +12,7 @@ from railsim.definitions.excitations.spectra import ERRI_B176, SPECTRA
 from railsim.definitions.loading import load_track
 from railsim.definitions.track.definition import Track
 from railsim.errors import InputError
-from railsim.track.irregularity import displacement, measured_remarks
+from railsim.track.irregularity import displacement, measured_remarks, shortest_length
 from railsim.track.tables import track_tables
 
 Y_LEFT, Z_LEFT, Y_RIGHT, Z_RIGHT, MU_LEFT, MU_RIGHT = range(6)
@@ -679,6 +679,14 @@ def test_rails_and_what_is_worked_out_from_them_are_not_added_up(header, words, 
     if "gauge" in header:
         (row, *_) = recorded(tmp_path, f"{header}\n{rows}", **kept).irregularities[0].rows
         assert row[3] - row[1] == pytest.approx(0.002)
+
+
+def test_a_recording_named_in_python_is_not_read():
+    part = {"type": "measured", "file": "rec.csv"}
+    track = load_track("straight").replace(irregularities=[part])
+    for use in (displacement, shortest_length, measured_remarks):
+        with pytest.raises(InputError, match=r"rec\.csv: a recording that has not been read"):
+            use(track)
 
 
 def test_missing_rows_are_remarked_on(tmp_path):

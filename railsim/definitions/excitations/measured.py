@@ -8,6 +8,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.base import Finite, Flag, NonNegative, Positive, Text, check, rises
 from railsim.definitions.excitations import base
+from railsim.errors import input_error
 
 # Keys that say how the file of a measured irregularity is read; its rows are what came of it.
 READING = ("encoding", "columns", "units", "offset", "reverse", "falling_mileage", "chord", "band")
@@ -74,6 +75,13 @@ class Measured(base.Irregular):
             if given:
                 raise ValueError(f"'{given[0]}' belongs to 'file' and does not go with 'rows'")
 
+    def _read(self) -> tuple[Row, ...]:
+        """Return the rows; InputError: the file was named in Python, where nobody reads it."""
+        if self.rows is None:
+            allowed = "its rows; or a track file that names it, read by railsim.load_track"
+            raise input_error(str(self.file), "a recording that has not been read", allowed)
+        return self.rows
+
     def mirrored(self) -> Self:
         """Return the rows with the rails exchanged, displacements to the right turned round."""
         rows = tuple((s, -yr, zr, -yl, zl) for s, yl, zl, yr, zr in self.rows or ())
@@ -86,7 +94,7 @@ class Measured(base.Irregular):
 
     def resolution(self) -> float:
         """Return half the least distance of the rows, 0.05 m at least [m]."""
-        s = [row[0] for row in self.rows or ()]
+        s = [row[0] for row in self._read()]
         return max(0.05, 0.5 * min(b - a for a, b in pairwise(s)))
 
     def summary(self) -> str:
@@ -100,7 +108,7 @@ class Measured(base.Irregular):
         In a gap with two rows more, between which the rails are level: to them they lose their
         slope by a parabola, as a spline would swing out and a shape-preserving one has a kink.
         """
-        rows = np.array(self.rows)
+        rows = np.array(self._read())
         positions = rows[:, 0] + self.shift
         values = self.scale * rows[:, 1:].T
         gaps = self.gaps()
