@@ -5,6 +5,7 @@ here, when everything else is prepared.
 """
 
 import math
+import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -134,7 +135,9 @@ class _Wiring:
             arm = tuple(np.subtract(signal.position, centre).tolist())
         period = 1.0 / signal.rate if signal.rate else 0.0
         slots = math.ceil(signal.delay / period - 1e-9) + 2 if period else 0
-        dice = np.random.default_rng(signal.seed).integers(1, 30000, 3).astype(float)
+        # by the name as well: signals of one seed have noise of their own
+        seed = signal.seed, zlib.crc32(name.encode())
+        dice = np.random.default_rng(seed).integers(1, 30000, 3).astype(float)
         base = self._blocks.room([0.0, 0.0, *dice, *([0.0] * slots)])
         how = (period, signal.delay, signal.noise, signal.resolution, signal.ahead)
         return [kind, of, group, component, base, slots], [*arm, *how]

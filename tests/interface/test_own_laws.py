@@ -262,13 +262,17 @@ def test_a_continued_run_has_the_bits_of_an_unbroken_one(coach, track):
 
 
 def test_signals_are_sampled_late_and_in_steps(coach, track):
-    """Sample k is the value at k T, known after the delay; noise has its deviation."""
+    """Sample k is the value at k T, known after the delay; noise has its deviation.
+
+    That of two signals is independent, also where both have one seed.
+    """
     plain = skyhook(coach)
     signals = {
         "now": SWAY,
         "late": {**SWAY, "rate": 100.0, "delay": 0.03},
         "coarse": {**SWAY, "resolution": 0.01},
         "loud": {"quantity": "time", "rate": 500.0, "noise": 2.0, "seed": 3},
+        "other": {"quantity": "time", "rate": 500.0, "noise": 2.0, "seed": 3},
     }
     vehicle = plain.replace(signals=signals, controllers=None)
     sim = railsim.Simulation(vehicle, track, **WAY | {"until": 60.0}, record=False)
@@ -276,13 +280,14 @@ def test_signals_are_sampled_late_and_in_steps(coach, track):
     while sim.time < 2.4:
         sim.step(0.005)
         seen.append([sim.time, *(sim.read(name) for name in signals)])
-    time, now, late, coarse, loud = np.array(seen).T
+    time, now, late, coarse, loud, other = np.array(seen).T
     assert np.allclose(coarse, 0.01 * np.round(now / 0.01), atol=1e-9)
     whole = np.isclose(time * 100.0, np.round(time * 100.0), atol=1e-6)
     assert np.allclose(late[whole][3:], now[whole][:-3], atol=1e-12)
     noise = loud - time
     assert abs(np.std(noise) - 2.0) < 0.25
     assert abs(np.mean(noise)) < 0.3
+    assert abs(np.corrcoef(noise, other - time)[0, 1]) < 4.0 / np.sqrt(len(time))
 
 
 def test_values_that_are_not_finite_end_the_run(coach, track):

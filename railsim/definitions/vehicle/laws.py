@@ -101,7 +101,7 @@ class Signal(base.Definition):
     noise: base.NonNegative = 0.0
     """Standard deviation of normal noise of each sample [unit of the quantity]; needs `rate`"""
     seed: base.Whole = 1
-    """Seed of the noise"""
+    """Seed of the noise; signals of one seed have each a noise of its own"""
     resolution: base.NonNegative = 0.0
     """Smallest difference of two values [unit of the quantity]; 0: as fine as numbers are"""
 
