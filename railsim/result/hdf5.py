@@ -227,6 +227,10 @@ def write(
 ) -> Path:
     """Write a result to a file, or some of its quantities; see `Result.to_hdf5`."""
     check_attributes(result.attributes)
+    for name, quantity in result.quantities.items():
+        if name in QUANTITIES and quantity.unit != QUANTITIES[name].unit:  # as it would be read
+            found, allowed = f"{name} in {quantity.unit}", "SI; `export` writes other units"
+            raise InputError([Fault(str(path), name, found, allowed)])
     wanted = set(result if names is None else names)
     selected = {name: q for name, q in result.quantities.items() if name in wanted}
     with Hdf5Sink(path, overwrite=overwrite, option=str(path), storage=storage) as sink:

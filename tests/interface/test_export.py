@@ -72,6 +72,13 @@ def test_units_of_positions_and_angles_are_shown_ones_too(result):
     np.testing.assert_array_equal(part.body_position, 1e3 * result.body_position)
 
 
+def test_a_result_file_holds_si_units_alone(result, tmp_path):
+    shown = selected(result, ["Q"], shown_units=True)
+    with pytest.raises(InputError, match="Q in kN; SI"):
+        shown.to_hdf5(tmp_path / "r.h5")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_values_at_a_lower_rate_are_filtered(result):
     part = selected(result, ["sum_Y"], rate=5.0)
     np.testing.assert_allclose(np.diff(part.time), 0.2)
