@@ -16,10 +16,8 @@ from typing import Any, Self
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import check_types
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import argument_error, nearest
 from railsim.kernels.actuators import COMMAND, send
 from railsim.kernels.controllers import BASE, VALUE
@@ -369,17 +367,14 @@ class Simulation:
         if not plain(run.system.actuators, memory, number, float(value), self.time):
             found = "more commands than one every 0.25 ms are on their way"
             raise argument_error("actuator", found, "fewer commands", actuator)
-        self._seen = self._begun = None
+        self._changed("Actuators")
 
     def set_rails(self, displacement: Floats, velocity: Floats) -> None:
         """Displace the rails under the wheels, as another program's bridge or track does.
 
-        They stay so until the next call; on rigid rails only, which they add to.
-
-        Parameters
-        ----------
-        displacement, velocity : float64[wheelset, side, 2]
-            Of the rail heads, lateral (right positive) and vertical (down positive) [m], [m/s].
+        They stay so until the next call; on rigid rails only, which they add to.  `displacement`,
+        `velocity` (float64[wheelset, side, 2]): of the rail heads, lateral (right positive) and
+        vertical (down positive) [m], [m/s].
         """
         if self._run.system.support.elastic:
             raise argument_error("set_rails", "a track with a support", "rigid rails")
@@ -392,7 +387,13 @@ class Simulation:
         before = motion.copy()
         motion[..., :2], motion[..., 2:] = given.values()
         if not np.array_equal(motion, before):
-            self._seen = self._begun = None
+            self._changed("Rails")
+
+    def _changed(self, what: str) -> None:
+        """Take note that the run does not follow from its inputs alone from here on."""
+        self._seen = self._begun = None
+        words = f"{what} were moved from outside: the stored inputs alone give another result."
+        self._run.remarks += [words] * (words not in self._run.remarks)
 
     def read(self, name: str) -> Any:
         """Return the present value of a signal, or of a quantity of the result [SI].
@@ -403,8 +404,7 @@ class Simulation:
         ------
         InputError : there is nothing of this name.
         """
-        signals = self._run.prepared.model.index.signals
-        values = self._present()
+        signals, values = self._run.prepared.model.index.signals, self._present()
         if name == "Q0":  # which has no dimension of time
             return self._run.prepared.balance.Q0.copy()
         if name in signals:

@@ -208,6 +208,23 @@ def test_lag_and_delay_of_an_actuator(coach, track):
     assert np.allclose(force, 4e3 * (1.0 - np.exp(-late / 0.05)), atol=1e-6)
 
 
+@pytest.mark.parametrize("given", [3e3, 0.0])
+def test_a_result_with_commands_says_that_its_inputs_do_not_give_it(coach, track, given):
+    """A command of 0 is that of the begin; it changes nothing."""
+    way = {"speed": 20.0, "duration": 0.3, "settings": SETTINGS}
+    with railsim.Simulation(commanded(coach), track, **way) as sim:
+        for _ in range(2):
+            sim.set("push", given)
+            sim.step(0.1)
+        found = sim.result()
+    again = railsim.simulate(**found.inputs())
+    n = len(found.time)
+    same = np.array_equal(again["element_force"][:n], found["element_force"])
+    assert same == (given == 0.0)
+    said = [words for words in found.remarks if "stored inputs alone" in words]
+    assert len(said) == (not same)
+
+
 @pytest.mark.parametrize(
     ("limit", "expected"), [({"rate_limit": 20e3}, 20e3 * 0.1), ({"force_limit": 1.5e3}, 1.5e3)]
 )
