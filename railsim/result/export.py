@@ -125,18 +125,25 @@ def selected(
 
 
 def _smooth(result: Result, name: str, rate: float) -> Floats:
-    """Return a quantity without what changes faster than half the rate; as it is at uneven times.
+    """Return a quantity without what changes faster than half the rate.
 
-    Y/Q is the quotient of both after the filter.  Others are bridged where they do not exist, as at
-    a wheel that does not touch, and do not exist there afterwards.
+    At uneven times it is filtered at even ones as close as they are.  Y/Q is the quotient of both
+    after the filter.  Others are bridged where they do not exist, as at a wheel that does not
+    touch, and do not exist there afterwards.
     """
     time, values = result["time"], result[name]
-    step = even_step(time)
-    if step is None or len(time) < 4 or rate * step >= 1.0:
+    if len(time) < 4:
         return values
+    steps = np.diff(time)
+    own = even_step(time)
+    step = own or float(max(steps.min(), 0.1 * steps.mean()))
+    if rate * step >= 1.0:
+        return values
+    even = np.arange(time[0], time[-1] + 0.5 * step, step)
 
     def passed(x: Floats) -> Floats:
-        return low_passed(x, 1.0 / step, 0.4 * rate)
+        slow = low_passed(x if own else _at(even, time, x), 1.0 / step, 0.4 * rate)
+        return slow if own else _at(time, even, slow)
 
     if name == "Y_over_Q" and {"Y", "Q"} <= set(result):
         return outward_quotient(passed(result["Y"]), passed(result["Q"]))

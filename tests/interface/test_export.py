@@ -125,6 +125,23 @@ def test_a_lower_rate_is_a_butterworth_at_two_fifths_of_it_up_to_the_end(result)
     np.testing.assert_allclose(part.contact_y[there], 0.75, rtol=1e-6)
 
 
+def test_uneven_times_are_filtered_too(result):
+    """Outputs at equal distances of a run that speeds up: 60 Hz would be one of 20 at 40 a second.
+
+    Between two values a straight line takes up to 1 % of a tone of 2 Hz at 200 a second.
+    """
+    distance = np.arange(2.0, 200.0, 0.05)
+    time = np.sqrt(distance)  # from 2.8 to 28 m/s, every 18 to 1.8 ms
+    slow, fast = (np.sin(2.0 * np.pi * f * time) for f in (2.0, 60.0))
+    fast *= np.clip(time - 7.0, 0.0, 1.0)  # where there are four values in a period at least
+    arrays = {"time": time, "distance": distance, "sum_Y": np.tile((slow + fast)[:, None], 4)}
+    about = {n: result.quantities[n] for n in arrays}, result.coordinates, result.attributes
+    part = selected(railsim.Result(arrays, *about), rate=40.0)
+    inner = slice(20, -20)
+    left = np.sin(4.0 * np.pi * part.time)
+    np.testing.assert_allclose(part.sum_Y[inner, 0], left[inner], atol=0.02)
+
+
 def test_a_rate_of_more_values_than_a_file_should_hold_is_refused(result):
     with pytest.raises(InputError, match=r"instants; 1e\+07 at most"):
         selected(result, ["Q"], rate=1e9)
