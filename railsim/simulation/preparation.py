@@ -27,7 +27,7 @@ from railsim.simulation.conditions import Inputs, TakenUp, check_agreement
 from railsim.simulation.disturbance import disturb
 from railsim.simulation.first_start import compiled_beside
 from railsim.simulation.outputs import OutputPlan, run_extremes
-from railsim.simulation.run_in import start_state
+from railsim.simulation.run_in import approach, start_state
 from railsim.simulation.run_progress import RunProgress
 from railsim.simulation.sampling import filtering, low_pass_remark, output_words, sampled
 from railsim.simulation.step_choice import StepChoice, inputs_hash
@@ -70,7 +70,9 @@ def prepare(
             on_run_in,
             remarks.append if settings.start_state == "steady" else None,
         )
-        remarks += [*begins_on_sections(model, start), *disturb(model, balance.Q0, settings, state)]
+        way = step * speed * approach(model, track, start, speed, step)
+        remarks += begins_on_sections(model, start - way)
+        remarks += disturb(model, balance.Q0, settings, state)
     else:
         state = _taken_up(before.motion, model.n_state)
     model = with_control(model, vehicle, settings)
@@ -93,7 +95,7 @@ def prepare(
 
 
 def begins_on_sections(model: Model, start: float) -> Iterator[str]:
-    """Remark on wheelsets that are within a range of sections at the start [m]."""
+    """Remark on wheelsets that are within a range of sections where the run-in starts [m]."""
     system = model.system
     places = start + system.frame_offset[system.bodies.frame[system.contact.body]]
     begin, end = model.rails.ends.T
@@ -101,8 +103,8 @@ def begins_on_sections(model: Model, start: float) -> Iterator[str]:
     names = [name for name, there in zip(model.index.wheelsets, inside, strict=True) if there]
     if names:
         yield (
-            f"The run begins with {listed(names)} within a range of track.sections, in the state "
-            "on the plain rail: its first forces are not those of a run from before the range."
+            f"The run, or its run-in, begins with {listed(names)} within a range of "
+            "track.sections, in the state on the plain rail."
         )
 
 

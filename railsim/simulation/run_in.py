@@ -7,8 +7,9 @@ rails: the wheelsets would climb or fall.  Therefore the vehicle runs in:
   starting position over a transition, and keeps them until the vehicle has settled; the state at
   its end, relative to the track frames, is the initial state; or, if requested, the initial state
   is the steady state found by Newton's method;
-- into a transition, a ramp or a vertical curve over the real track, from the last position before
-  it where the track under the vehicle is uniform, since its state depends on the twist passed;
+- into a transition, a ramp, a vertical curve or a range of changing rail sections over the real
+  track, from the last position before it where the track under the vehicle is uniform, since its
+  state depends on the twist, or the rails, passed;
 - onto irregular rails over the last seconds of the real track before the start;
 - where it does not stay on the rails that way, over the whole track from its beginning: so it can
   start wherever a run passes.
@@ -49,6 +50,7 @@ from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.assembly import Model
 from railsim.model.check_rails import CheckRails, standing_at
 from railsim.model.equilibrium import Equilibrium, initial_state
+from railsim.model.uneven_wheels import ROUND, rolling
 from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
 from railsim.simulation.auxiliary_track import (
     DOING,
@@ -111,7 +113,8 @@ def start_state(
         state[ARC_LENGTH] = s
         if steps:
             follow_rails(model, state)
-            system = _guided(without_loads(model.system), model.check)
+            round_ones = ROUND._replace(surface_of=np.full_like(model.wheels.surface_of, -1))
+            system = rolling(without_loads(model.system), round_ones, model.check, model.rails)
             system = system._replace(drive=CONSTANT_SPEED)
             _run(model, system, state, step, steps, scheme, start, "on its way there", approaching)
         state[-3:] = 0.0, start, speed
@@ -119,7 +122,7 @@ def start_state(
             follow_wheels(model, state, track.rail_base)
         return state
 
-    steps = _approach(model, track, start, speed, step)
+    steps = approach(model, track, start, speed, step)
     whole = math.floor(start / (speed * step))
     try:
         return arrived(steps)
@@ -160,16 +163,17 @@ def _friction(track: Track, s: float) -> tuple[float, float]:
     return left, right
 
 
-def _approach(model: Model, track: Track, start: float, speed: float, step: float) -> int:
+def approach(model: Model, track: Track, start: float, speed: float, step: float) -> int:
     """Steps to run on the real track before the start.
 
-    Irregular rails need a certain time.  A transition, a ramp or a vertical curve is entered as in
-    a run over the whole track: from the last position before it where curvature, cant and gradient
-    under the whole vehicle are constant.
+    Irregular rails need a certain time.  A transition, a ramp, a vertical curve or a range of rail
+    sections is entered as in a run over the whole track: from the last position before it where
+    curvature, cant, gradient and rails under the whole vehicle are constant.
     """
     system = model.system
     room = start + float(np.min(system.frame_offset)) - system.track.s_start - SMOOTH
-    way = _way_from_constant(alignment_of(track), start, system.frame_offset, room, speed)
+    along = alignment_of(track), model.rails.ends
+    way = _way_from_constant(*along, start, system.frame_offset, room, speed)
     if _displaced(model, start):
         way = max(way, APPROACH_TIME * speed, APPROACH)
     return max(0, math.floor(min(way, room) / (speed * step)))
@@ -185,7 +189,7 @@ def _displaced(model: Model, start: float) -> bool:
 
 
 def _way_from_constant(
-    alignment: Alignment, start: float, offsets: Floats, room: float, speed: float
+    alignment: Alignment, ranges: Floats, start: float, offsets: Floats, room: float, speed: float
 ) -> float:
     """Way to the start from where the track under the vehicle does not change [m].
 
@@ -202,6 +206,7 @@ def _way_from_constant(
             alignment.grade_angle_rate(s),
         ]
         constant = np.all(np.abs(changes) < UNCHANGING, axis=(0, 2))
+        constant &= ~((ranges[:, 0] < s[:, -1:]) & (s[:, :1] < ranges[:, 1])).any(axis=1)
         if constant.any():
             return float(tried[int(np.argmax(constant))])
     return float(farthest)

@@ -137,6 +137,7 @@ CHANGING = {
             {"type": "CST", "length": 300.0, "gradient": 0.01},
         ]
     },
+    "rail sections": {},
 }
 
 
@@ -154,12 +155,13 @@ CHANGING = {
     ],
 )
 def test_the_way_to_a_start_begins_where_nothing_changes_under_the_vehicle(kind, start, room, way):
-    """From 100 to 140 m, and 5 m around, by rounded corners, curvature, cant or gradient changes.
+    """From 100 to 140 m, and 5 m around by rounded corners, one of them changes.
 
     The axles are 5 m ahead and 20 m behind.
     """
     plan = [{"type": "STR", "length": 440.0}]
     track = railsim.load_track("straight").replace(**{"plan": plan, **CHANGING[kind]})
-    found = _way_from_constant(Alignment(track), start, np.array([5.0, -20.0]), room, 10.0)
+    ranges, axles = np.array([[95.0, 145.0]][kind != "rail sections" :]), np.array([5.0, -20.0])
+    found = _way_from_constant(Alignment(track), ranges.reshape(-1, 2), start, axles, room, 10.0)
     assert found == pytest.approx(way, abs=0.51)
     assert (found > 0.0) == (way > 0.0)

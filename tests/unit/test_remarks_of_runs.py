@@ -173,4 +173,4 @@ def test_a_run_that_begins_on_changing_rails_says_so(start, names):
     index, rails = Record(wheelsets=("a", "b")), np.array([[49.2, 51.7]])
     model = Record(system=under, index=index, rails=Record(ends=rails))
     found = "".join(begins_on_sections(model, start))
-    assert found[:26] == (f"The run begins with {names} with" if names else "")
+    assert (f"begins with {names} within a range" in found) == bool(names)
