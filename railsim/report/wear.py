@@ -34,11 +34,11 @@ def shares_of(runs: Sequence[dict[str, Any]]) -> str:
 
 
 def wear_tables(of: Worn, rows: Rows) -> list[Table]:
-    """Return the table of each profile, one row for each step."""
+    """Return the table of each profile, one row for each step; a depth shown as 0 has no place."""
     columns = [
         Column("distance", of.amount, of.unit, "g"),
         Column("area", "worn area", "mm2", ".4f"),
-        Column("deepest", "", "mm", ".4f"),
+        deepest := Column("deepest", "", "mm", ".4f"),
         Column("deepest_y", "at y", "mm", ".1f"),
         Column("equivalent_conicity", "conicity at 3 mm", "", ".3f"),
         Column("flange_thickness", "flange thickness", "mm", ".2f"),
@@ -48,5 +48,9 @@ def wear_tables(of: Worn, rows: Rows) -> list[Table]:
     tables = []
     for side, of_side in rows.items():
         known = [column for column in columns if column.name in of_side[0]]
+        of_side = [
+            row if float(deepest.text(row["deepest"])) else row | {"deepest_y": None}
+            for row in of_side
+        ]
         tables.append(Table(known, of_side, "" if side == "rows" else f"{side} rail"))
     return tables

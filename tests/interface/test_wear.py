@@ -10,6 +10,7 @@ import railsim
 from railsim.cli import main
 from railsim.errors import ModelError
 from railsim.profiles import load_profile
+from railsim.report.wear import WHEELS, wear_tables
 from railsim.studies.wear_loop import WearStep, wear_loop
 
 SHORT = """format = "railsim-track/1"
@@ -203,6 +204,13 @@ def test_command_draws_the_wear_of_both_rails(tmp_path, monkeypatch):
     assert main(["report", str(tmp_path / "w"), "--out", str(page)]) == 0
     for words in ("wear of the rails", "left rail", "right rail", "0.200", "0.050"):
         assert words in page.read_text()
+
+
+@pytest.mark.parametrize(("deepest", "place"), [(4e-8, ""), (6e-8, "-2.5")])
+def test_a_depth_that_is_printed_as_zero_has_no_place(deepest, place):
+    row = {"distance": 1e6, "area": 0.0, "deepest": deepest, "deepest_y": -2.5e-3}
+    (table,) = wear_tables(WHEELS, {"rows": [row]})
+    assert table.texts() == [["1000", "0.0000", "0.0001" if place else "0.0000", place]]
 
 
 def test_all_that_is_wrong_is_told_at_once_by_its_option(capsys):
