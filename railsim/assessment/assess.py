@@ -1,7 +1,9 @@
 """`assess`: results against limits; the function that the command line and studies call."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from railsim.assessment.assessment import Assessment
 from railsim.assessment.comfort_report import (
@@ -10,7 +12,7 @@ from railsim.assessment.comfort_report import (
     short_of_blocks,
     underestimated,
 )
-from railsim.assessment.record import RUNNING, Record
+from railsim.assessment.record import LEFT_OUT, RUNNING, Record, TooShort
 from railsim.assessment.running import assess_running, by_vehicle, running_limits
 from railsim.assessment.safety import safety_report
 from railsim.assessment.verdict import status_words
@@ -19,7 +21,7 @@ from railsim.assessment.wear_report import wear_report
 from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.definitions.loading import load_comfort_limits
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import argument_error, listed
+from railsim.errors import InputError, argument_error, listed
 from railsim.result import Result
 
 STANDARDS = (*RUNNING, "comfort", "wear", "safety")
@@ -91,7 +93,8 @@ def assess(
     Raises
     ------
     InputError
-        A result lacks a quantity, is sampled too coarsely or is too short; an option that the
+        A result lacks a quantity or is sampled too coarsely; all are too short (among others,
+        one that is too short for comfort or wear is named in the remarks); an option that the
         standard does not use.
 
     Examples
@@ -139,35 +142,46 @@ def _by_runs(
 ) -> Assessment:
     """Comfort, wear or safety, run by run."""
     vehicle = next(iter(runs.values())).vehicle().name
-    records = {name: Record(result, name, coarse=coarse) for name, result in runs.items()}
-    remarks = [remark for record in records.values() for remark in record.remarks()]
-    ended = [status_words(name, r) for name, r in runs.items() if r.status != "complete"]
+    reports: dict[str, Callable[[Record], Any]] = {
+        "comfort": comfort_report, "wear": partial(wear_report, law=law), "safety": safety_report
+    }  # fmt: skip
+    records, found, short = dict[str, Record](), dict[str, Any](), list[TooShort]()
+    for name, result in runs.items():
+        try:
+            records[name] = Record(result, name, coarse=coarse)
+            found[name] = reports[standard](records[name])
+        except TooShort as error:
+            if standard == "safety":  # it may have derailed
+                raise
+            short.append(error)
+    if not found:
+        raise InputError(fault for error in short for fault in error.faults)
+    remarks = [f"{LEFT_OUT}{error}" for error in short]
+    remarks += [remark for name in found for remark in records[name].remarks()]
+    ended = [status_words(name, runs[name]) for name in found if runs[name].status != "complete"]
     remarks += [f"{words}; only the part before that is assessed" for words in ended]
     about = vehicle, standard, tuple(runs)
     driven = {name: (result.speed, *_rails(result)) for name, result in runs.items()}
+    if standard == "safety":
+        return Assessment(*about, safety=found, remarks=tuple(remarks))
     if standard == "wear":
-        wear = {name: wear_report(record, law) for name, record in records.items()}
-        if bare := [name for name, wheels in wear.items() if wheels[0].fatigue_index is None]:
+        if bare := [name for name, wheels in found.items() if wheels[0].fatigue_index is None]:
             remedy = "run with settings.outputs.contact_patches=true"
             words = "USFD and FI_surf have no values without contact patches"
             remarks.append(f"{listed(bare)}: {words}; {remedy}")
-        if (model := next(iter(wear.values()))[0].model) != WholeLifeRailModel():
+        if (model := next(iter(found.values()))[0].model) != WholeLifeRailModel():
             counted = f"threshold {model.threshold:g} N, counted: {model.counted}"
             remarks.append(f"Whole Life Rail Model of {law}: {counted}")
-        return Assessment(*about, wear=wear, remarks=tuple(remarks), driven=driven)
-    if standard == "safety":
-        safety = {name: safety_report(record) for name, record in records.items()}
-        return Assessment(*about, safety=safety, remarks=tuple(remarks))
+        return Assessment(*about, wear=found, remarks=tuple(remarks), driven=driven)
     classes = load_comfort_limits(limits or "comfort")
-    comfort = {name: comfort_report(record) for name, record in records.items()}
-    for name, points in comfort.items():
+    for name, points in found.items():
         said = [short_of_blocks(points), underestimated(points)]
         said += [caused_by_hunting(records[name], points)]
         remarks += [f"{name}: {sentence}" for sentence in said if sentence]
     if not classes.mean_comfort.checked:
         remarks.append(f"classes of {classes.edition} not checked against the printed standard")
     said_once = tuple(dict.fromkeys(remarks))
-    return Assessment(*about, comfort=comfort, remarks=said_once, limits=classes, driven=driven)
+    return Assessment(*about, comfort=found, remarks=said_once, limits=classes, driven=driven)
 
 
 def _rails(result: Result) -> tuple[str, str]:

@@ -71,7 +71,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
     """Comfort at all measuring points except those on bogie frames.
 
     `record`: Run with sensor readings, or with the motion of the bodies. Raises InputError: there
-    are no measuring points, or the run is shorter than one block of 5 s.
+    are no measuring points; TooShort: the run is shorter than one block of 5 s.
     """
     record.need_quantities("comfort")
     names = [name for name in record.sensors if not name.startswith("frame_")]
@@ -91,7 +91,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
             into.add(a[:, column], counted, record.rate)
     if not gathered[0].blocks:
         allowed = "at least 5 s after the first 3 s"
-        raise input_error(record.name, "too short for one block of 5 s", allowed, "time")
+        raise record.too_short("too short for one block of 5 s", allowed)
     transitions = _transitions(record, columns)
     return [
         PointComfort(

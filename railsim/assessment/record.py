@@ -34,6 +34,7 @@ NEEDED = {
     "safety": ("Q", "Y_over_Q", "wheelset_distance"),
 }
 """Quantities by standard, beside accelerations or the motion of the bodies."""
+LEFT_OUT = "not assessed: "  # begin of a remark on a run
 START = 3.0  # s after the start that are not assessed
 MOTION = ("body_position", "body_velocity", "body_acceleration")
 AMPLITUDE = 3e-3  # m, of the equivalent conicity
@@ -78,11 +79,15 @@ def coarseness(settings: Settings, rate: float) -> tuple[str, str]:
     return "", ""
 
 
+class TooShort(InputError):
+    """Of a run there is too little to assess."""
+
+
 class Record:
     """A result as a measured record.
 
     `name`: Name of the run in messages. `coarse`: Accept a result that is sampled too coarsely.
-    Raises InputError: unequal time steps, too few samples per second, too short.
+    Raises InputError: unequal time steps, too few samples per second; TooShort: below 11 instants.
     """
 
     def __init__(self, result: Result, name: str, *, coarse: bool = False) -> None:
@@ -90,7 +95,7 @@ class Record:
         self.time, self.distance = result["time"], result["distance"]
         steps = np.diff(self.time)
         if len(steps) < 10:
-            raise self.fault("time", f"{len(self.time)} instants", "a longer run")
+            raise self.too_short(f"{len(self.time)} instants", "a longer run")
         # the last step of a run is shorter if the run ends between two outputs
         self.rows = len(self.time) - 1
         step = float(np.median(steps))
@@ -107,6 +112,10 @@ class Record:
     def fault(self, key: str, found: str, allowed: str) -> InputError:
         """Return the error for a property of the result that is not admissible."""
         return InputError([Fault(self.name, key, found, allowed, option=self.name)])
+
+    def too_short(self, found: str, allowed: str) -> TooShort:
+        """Return the error for a run of which too little is left to assess."""
+        return TooShort(self.fault("time", found, allowed).faults)
 
     def need(self, names: Sequence[str], output: str) -> None:
         """Refuse a result that lacks some of `names`; InputError names the `output` to request."""

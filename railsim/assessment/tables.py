@@ -9,6 +9,7 @@ from typing import Any
 from railsim.assessment.assessment import Assessment
 from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.criteria import CRITERIA, WORDS
+from railsim.assessment.record import LEFT_OUT
 from railsim.assessment.safety import SafetyReport
 from railsim.assessment.sections import TestSection
 from railsim.assessment.wear import LAWS
@@ -192,12 +193,16 @@ def assessment_lines(assessment: Assessment, *, quiet: bool) -> list[str | Table
         lines += [f"    {reason}" for reason in assessment.reasons]
     for table in tables(assessment):
         lines += ["", table]
-    remarks = [] if quiet else counted_remarks(_of_runs(assessment))
-    return [*lines, *[""] * (not quiet), *(f"remark: {one}" for one in remarks)]
+    left_out = [one for one in assessment.remarks if one.startswith(LEFT_OUT)]
+    remarks = left_out if quiet else [*left_out, *counted_remarks(_of_runs(assessment))]
+    between = [""] * (not quiet or bool(left_out))
+    return [*lines, *between, *(f"remark: {one}" for one in remarks)]
 
 
 def _of_runs(assessment: Assessment) -> Iterator[tuple[str, str]]:
     """Yield remarks with the names of their runs, nothing where they are of all."""
     for remark in assessment.remarks:
+        if remark.startswith(LEFT_OUT):
+            continue
         name, _, words = remark.partition(": ")
         yield (name, words) if name in assessment.runs else ("", remark)

@@ -98,7 +98,7 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
             worn[name] += np.sum(lost.sum(axis=-1) * ways, axis=0)
     if not length > 0.0:
         found = f"{record.time[-1] - record.time[0]:.3g} s"
-        raise record.fault("time", found, f"more than the first {START:g} s, which do not count")
+        raise record.too_short(found, f"more than the first {START:g} s, which do not count")
     wheels = []
     for w, k in np.ndindex(shape):
         stream, worst_damage = streams[w, k], np.argmax(np.abs(damage[w, k]))

@@ -864,6 +864,25 @@ def test_wear_of_a_run_that_ended_soon(duration, counted, status, tmp_path, caps
     assert said.err == (words if status == 2 else "")
 
 
+@pytest.mark.parametrize("standard", ["comfort", "wear"])
+def test_a_run_that_is_too_short_is_named_and_the_others_are_assessed(standard, tmp_path, capsys):
+    """As those of EN 14363, a run without a section; also with --quiet."""
+    paths = [
+        str(example_result(duration=duration, rate=10.0).to_hdf5(tmp_path / f"{name}.h5"))
+        for name, duration in {"first": 3.0, "long": 20.0, "last": 1.0}.items()
+    ]
+    given = ["--standard", standard, "--coarse", "--quiet"]
+    assert main(["assess", *paths, *given]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    left = [line for line in shown if line.startswith("remark: not assessed: ")]
+    assert [line.split(": ")[2] for line in left] == ["first", "last"]
+    assert any(line.startswith("long") for line in shown)
+    assert not any(line.startswith(("first", "last")) for line in shown)
+    assert main(["assess", paths[0], paths[2], *given]) == 2
+    faults = capsys.readouterr().err.splitlines()
+    assert [line.split(":")[0] for line in faults] == ["first", "last"]
+
+
 @pytest.mark.parametrize("instant", [40.0, 63.0])
 def test_an_event_counts_wherever_it_is(instant):
     """Also where a run is read in pieces of 60 s after the first 3 s: a bump of the car body."""
