@@ -125,6 +125,13 @@ class TrackAssessment:
                          p.shape, *[p.mileage] * own])  # fmt: skip
         return Table(columns, rows)
 
+    def _with_units(self) -> Table:
+        """Return the places with the SI unit of each value beside it."""
+        shown = self.table()
+        k = [column.name for column in shown.columns].index("value") + 1
+        rows = [[*row[:k], row[k - 1].column.si_unit or "1", *row[k:]] for row in shown.rows]
+        return Table([*shown.columns[:k], "unit", *shown.columns[k:]], rows)
+
     @property
     def notes(self) -> tuple[str, ...]:
         """Misses and false alarms in words."""
@@ -142,7 +149,7 @@ class TrackAssessment:
         """Return the assessment as plain data, SI."""
         names = ("both", "missed", "false_alarms", "none", "not_run")
         return {
-            "share": self.share, "places": self.table().records(),
+            "share": self.share, "places": self._with_units().records(),
             "sections": self.sections.records(),
             "flagged": dict(zip(names, self.flagged.tolist(), strict=True)),
             "remarks": [UNCHECKED, *self.remarks],
@@ -150,7 +157,7 @@ class TrackAssessment:
 
     def write(self) -> list[Path]:
         """Write places and sections as CSV into the folder of the runs."""
-        tables = {"places.csv": self.table(), "sections.csv": self.sections}
+        tables = {"places.csv": self._with_units(), "sections.csv": self.sections}
         content = {name: table.csv().encode() for name, table in tables.items()}
         return write_folder(self.folder, content, overwrite=True)
 

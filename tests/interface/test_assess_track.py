@@ -1,5 +1,6 @@
 """`railsim assess-track`: places, pieces against one run, geometry beside it, resume, bad input."""
 
+import csv
 import json
 from dataclasses import replace
 from types import SimpleNamespace
@@ -117,6 +118,12 @@ def test_command(judged, recording, capsys, monkeypatch):
     assert main(arguments) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["places"][0]["shape"].startswith("alignment")
+    units = {"Q": "N", "Y/Q": "1", "sum Y": "N"}
+    with (judged[2] / "places.csv").open() as lines:
+        rows = list(csv.DictReader(lines))
+    assert [row["unit"] for row in rows] == [units.get(row["quantity"], "m/s2") for row in rows]
+    assert [row["unit"] for row in rows] == [place["unit"] for place in data["places"]]
+    assert [float(row["value"]) for row in rows] == [place["value"] for place in data["places"]]
     assert (judged[2] / "heat_strip.png").is_file()
     page = (judged[2] / "report.html").read_text(encoding="utf-8")
     assert "alignment" in page
