@@ -214,8 +214,13 @@ class RootLocus(Plottable):
         )
 
     def record(self) -> list[dict[str, Any]]:
-        """Return one record a value."""
-        return [modes.record() for modes in self.sets]
+        """Return one record a value; `branch` of a mode is its name of `names`."""
+        records, names = [modes.record() for modes in self.sets], self.names
+        for modes, record in zip(self.sets, records, strict=True):
+            branches = (name for name, m in zip(names, modes.modes, strict=True) if m.exists)
+            for mode, branch in zip(record["modes"], branches, strict=True):
+                mode["branch"] = branch
+        return records
 
     notes: ClassVar[tuple[str, ...]] = ()
 

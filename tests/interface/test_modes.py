@@ -55,6 +55,21 @@ def test_modes_of_a_locus_have_names_of_their_own():
     ]
     found = RootLocus("speed", (10.0, 20.0, 30.0, 40.0), tuple(sets))
     assert found.names == ("lateral", "lateral 2", "lateral 3")
+    there = found.record()[3]["modes"]
+    assert [mode["name"] for mode in there] == ["lateral", "bounce", "lateral 2"]
+    assert [mode["branch"] for mode in there] == list(found.names)
+
+
+def test_a_branch_of_a_locus_keeps_its_name_where_another_one_is_missing():
+    """In records, which leave out what is not there at a value."""
+    absent = complex(np.nan)
+    sets = [
+        Modes(20.0, Contact(), tuple(Mode("sway", value, {}, {}) for value in values))
+        for values in ((1j, 2j), (absent, 3j))
+    ]
+    records = RootLocus("speed", (10.0, 20.0), tuple(sets)).record()
+    branches = [{m["branch"]: m["eigenvalue"][1] for m in one["modes"]} for one in records]
+    assert branches == [{"sway": 1.0, "sway 2": 2.0}, {"sway 2": 3.0}]
 
 
 def test_root_locus_in_json_and_folder(capsys, tmp_path):
@@ -77,6 +92,7 @@ def test_root_locus_in_json_and_folder(capsys, tmp_path):
     mode = records[0]["modes"][0]
     assert set(mode) == {
         "name",
+        "branch",
         "frequency",
         "natural_frequency",
         "damping_ratio",
