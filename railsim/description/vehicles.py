@@ -42,6 +42,9 @@ def describe_vehicle(vehicle: Vehicle) -> Description:
         "reference": flat.reference,
         "mass": flat.mass,
         "mean_wheel_load": flat.mean_wheel_load,
+        "service": vehicle.service and vehicle.service.model_dump(),
+        "load": vehicle.load,
+        "loads": list(vehicle.loads),
         "bodies": bodies,
         "elements": elements,
     }

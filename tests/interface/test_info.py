@@ -61,6 +61,15 @@ def test_vehicle_as_json_is_placed_and_mirrored(capsys):
     assert len(data["elements"]) == 34
 
 
+def test_vehicle_as_json_has_what_the_screen_says_of_service_and_load(capsys):
+    """120 km/h, 150 mm of cant deficiency; design load, or laden."""
+    assert main(["info", "coach_manchester", "--load", "laden", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert 3.6 * data["service"]["admissible_speed"] == pytest.approx(120.0)
+    assert data["service"]["cant_deficiency"] == 0.15
+    assert (data["load"], data["loads"]) == ("laden", ["laden"])
+
+
 def test_value_can_be_replaced_before_looking(capsys):
     data = data_of(capsys, "coach_manchester", "--set", "bodies.carbody.mass=40000")
     assert data["bodies"][0]["mass"] == 40000.0
