@@ -142,14 +142,14 @@ def _by_runs(
 ) -> Assessment:
     """Comfort, wear or safety, run by run."""
     vehicle = next(iter(runs.values())).vehicle().name
-    reports: dict[str, Callable[[Record], Any]] = {
-        "comfort": comfort_report, "wear": partial(wear_report, law=law), "safety": safety_report
-    }  # fmt: skip
+    of_wear = partial(wear_report, law=law)
+    reports = {"comfort": comfort_report, "wear": of_wear, "safety": safety_report}
+    report: Callable[[Record], Any] = reports[standard]
     records, found, short = dict[str, Record](), dict[str, Any](), list[TooShort]()
     for name, result in runs.items():
         try:
             records[name] = Record(result, name, coarse=coarse)
-            found[name] = reports[standard](records[name])
+            found[name] = report(records[name])
         except TooShort as error:
             if standard == "safety":  # it may have derailed
                 raise
@@ -158,8 +158,10 @@ def _by_runs(
         raise InputError(fault for error in short for fault in error.faults)
     remarks = [f"{LEFT_OUT}{error}" for error in short]
     remarks += [remark for name in found for remark in records[name].remarks()]
-    ended = [status_words(name, runs[name]) for name in found if runs[name].status != "complete"]
-    remarks += [f"{words}; only the part before that is assessed" for words in ended]
+    for name, result in runs.items():
+        if result.status != "complete":
+            part = "; only the part before that is assessed" if name in found else ""
+            remarks.append(f"{status_words(name, result)}{part}")
     about = vehicle, standard, tuple(runs)
     driven = {name: (result.speed, *_rails(result)) for name, result in runs.items()}
     if standard == "safety":

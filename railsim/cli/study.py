@@ -220,7 +220,8 @@ def _campaign(
             show("", *assessment_lines(assessment, quiet=output.quiet))
     records = [assessment.record() for assessment in done.assessments]
     output.answer({"folder": str(done.folder), "assessments": records})
-    return cli.DONE
+    ended = any(result.status != "complete" for result in done.results.values())
+    return cli.ENDED_EARLY if ended else cli.DONE
 
 
 def _spec(

@@ -867,10 +867,12 @@ def test_wear_of_a_run_that_ended_soon(duration, counted, status, tmp_path, caps
 @pytest.mark.parametrize("standard", ["comfort", "wear"])
 def test_a_run_that_is_too_short_is_named_and_the_others_are_assessed(standard, tmp_path, capsys):
     """As those of EN 14363, a run without a section; also with --quiet."""
-    paths = [
-        str(example_result(duration=duration, rate=10.0).to_hdf5(tmp_path / f"{name}.h5"))
-        for name, duration in {"first": 3.0, "long": 20.0, "last": 1.0}.items()
-    ]
+    lasting = {"first": 3.0, "long": 20.0, "last": 1.0}
+    ended = {"last": {"status": "derailed"}}
+    made_up = {
+        n: example_result(duration=t, rate=10.0, **ended.get(n, {})) for n, t in lasting.items()
+    }
+    paths = [str(result.to_hdf5(tmp_path / f"{name}.h5")) for name, result in made_up.items()]
     given = ["--standard", standard, "--coarse", "--quiet"]
     assert main(["assess", *paths, *given]) == 0
     shown = capsys.readouterr().out.splitlines()
@@ -878,6 +880,8 @@ def test_a_run_that_is_too_short_is_named_and_the_others_are_assessed(standard, 
     assert [line.split(": ")[2] for line in left] == ["first", "last"]
     assert any(line.startswith("long") for line in shown)
     assert not any(line.startswith(("first", "last")) for line in shown)
+    assert main(["assess", *paths, *given[:-1]]) == 0  # without --quiet
+    assert "remark: last: derailed\n" in capsys.readouterr().out
     assert main(["assess", paths[0], paths[2], *given]) == 2
     faults = capsys.readouterr().err.splitlines()
     assert [line.split(":")[0] for line in faults] == ["first", "last"]

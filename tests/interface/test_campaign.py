@@ -448,6 +448,21 @@ def test_interrupted_campaign_loses_nothing_and_goes_on(tmp_path, simulated, cap
     assert "holds a study with other assignments" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("status", "left"), [("complete", 0), ("derailed", 3), ("stopped", 3)])
+def test_exit_status_tells_of_runs_that_ended_early(tmp_path, simulated, monkeypatch, status, left):
+    """As of a study without a scenario."""
+
+    def simulate(*_, sink, **how):
+        return feed(sink, duration=1.0, rate=10.0, status=status)
+
+    monkeypatch.setattr(railsim.studies.run, "simulate", simulate)
+    (tmp_path / "two.toml").write_text(TWO)
+    given = ["study", "--scenario", str(tmp_path / "two.toml"), "--vehicles", "coach_manchester"]
+    given += ["--out", str(tmp_path / "out"), "--workers", "1", "--quiet"]
+    assert main(given) == left
+    assert main(given) == left
+
+
 def test_failed_run_of_a_campaign_is_a_line(tmp_path, monkeypatch, capsys):
     def simulate(*_, **how):
         raise railsim.errors.ModelError("no equilibrium")
