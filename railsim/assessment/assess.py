@@ -142,14 +142,14 @@ def _by_runs(
 ) -> Assessment:
     """Comfort, wear or safety, run by run."""
     vehicle = next(iter(runs.values())).vehicle().name
-    of_wear = partial(wear_report, law=law)
-    reports = {"comfort": comfort_report, "wear": of_wear, "safety": safety_report}
-    report: Callable[[Record], Any] = reports[standard]
+    reports: dict[str, Callable[[Record], Any]]
+    reports = {"comfort": comfort_report, "safety": safety_report}
+    reports["wear"] = partial(wear_report, law=law)
     records, found, short = dict[str, Record](), dict[str, Any](), list[TooShort]()
     for name, result in runs.items():
         try:
             records[name] = Record(result, name, coarse=coarse)
-            found[name] = report(records[name])
+            found[name] = reports[standard](records[name])
         except TooShort as error:
             if standard == "safety":  # it may have derailed
                 raise

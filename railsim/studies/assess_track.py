@@ -129,7 +129,8 @@ class TrackAssessment:
         """Return the places with the SI unit of each value beside it."""
         shown = self.table()
         k = [column.name for column in shown.columns].index("value") + 1
-        rows = [[*row[:k], row[k - 1].column.si_unit or "1", *row[k:]] for row in shown.rows]
+        units = [QUANTITIES[place.quantity].si_unit or "1" for place in self.places]
+        rows = [[*row[:k], unit, *row[k:]] for row, unit in zip(shown.rows, units, strict=True)]
         return Table([*shown.columns[:k], "unit", *shown.columns[k:]], rows)
 
     @property
