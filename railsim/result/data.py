@@ -438,12 +438,13 @@ class Result:
             dims = quantity.dims[1:]
             places = chosen_names(dims, self._coordinates, wanted)
             combinations = product(*(self._coordinates[dim] for dim in dims))
-            for labels, values in zip(combinations, array.reshape(len(array), -1).T, strict=True):
+            each = product(*map(range, array.shape[1:]))
+            for labels, at in zip(combinations, each, strict=True):
                 if any(labels[k] not in chosen for k, chosen in places.items()):
                     continue
                 along = "component" in quantity.dims
                 unit = quantity.component(labels[-1]).unit if along else quantity.unit
-                yield ":".join((name, *labels)), unit, values
+                yield ":".join((name, *labels)), unit, array[:, *at]
 
 
 class FrozenArrays(Mapping[str, Floats]):

@@ -15,7 +15,14 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.errors import Faults, argument_error, argument_fault, nearest, optional_package
+from railsim.errors import (
+    Faults,
+    argument_error,
+    argument_fault,
+    input_error,
+    nearest,
+    optional_package,
+)
 from railsim.files.access import check_file, whole_file
 from railsim.result.data import Result
 from railsim.result.filters import even_step, low_passed, outward_quotient
@@ -90,6 +97,9 @@ def selected(
             allowed = nearest(label, known)
             faults.append(argument_fault("quantities", selection, found, allowed, "QUANTITY"))
     time, distance = result["time"], result["distance"]
+    if not len(time) and (between or rate is not None):
+        found = f"holds no instants: {result.status}"
+        raise input_error("result", found, "a run of some length", "time")
     low, high = between or (-np.inf, np.inf)
     rows = np.flatnonzero((distance >= low) & (distance <= high))
     if between and len(rows) < 2:

@@ -147,6 +147,21 @@ def test_a_rate_of_more_values_than_a_file_should_hold_is_refused(result):
         selected(result, ["Q"], rate=1e9)
 
 
+def test_a_run_that_ended_at_its_start_has_columns_and_no_rows(result, tmp_path, capsys):
+    over_time = {name for name, one in result.quantities.items() if one.dims[0] == "time"}
+    arrays = {name: result[name][: 0 if name in over_time else None] for name in result}
+    parts = result.quantities, result.coordinates, result.attributes, result.profiles
+    file = str(railsim.Result(arrays, *parts).to_hdf5(tmp_path / "run.h5"))
+    out = tmp_path / "run.csv"
+    assert main(["export", file, "Q", "sum_Y", "--out", str(out)]) == 0
+    (header,) = out.read_text().splitlines()
+    assert header.count("Q:") == 8
+    for part in (["--between", "0", "10"], ["--rate", "10"]):
+        assert main(["export", file, "--out", str(out), "--overwrite", *part]) == 2
+        assert capsys.readouterr().err.startswith("result: time: holds no instants: complete; ")
+    assert out.read_text().splitlines() == [header]
+
+
 def test_all_that_is_wrong_is_named_at_once(result, tmp_path, capsys):
     file = result.to_hdf5(tmp_path / "run.h5")
     wrong = ["export", str(file), "QQ", "--between", "1e6", "2e6", "--rate", "-1"]
