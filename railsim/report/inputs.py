@@ -96,7 +96,7 @@ def what_was_run(
     if used and not results:
         section.texts.append(
             "Vehicles and tracks as their files are now, with the values of the first run of each "
-            "vehicle on each track; results were not kept."
+            "vehicle on each track; there are no files of results."
         )
     for name, vehicle in vehicles.items():
         words = f"{_named(vehicle, name)}{vehicle.source or ''}"

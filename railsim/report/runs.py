@@ -158,7 +158,9 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> doc.Sect
     mixed = "outputs, and over all steps where a result holds these,"
     instants = kinds.get((any(of_steps), all(of_steps)), mixed)
     texts, done = [PEAKS.format(instants=instants)], len(_done(records))
-    if not shown:
+    if not done:
+        texts = ["No run has values; why stands under the failures below."]
+    elif not shown:
         texts = ["The study kept no results of its runs (`--keep summary`); their values follow."]
     elif len(shown) < done:
         texts.append(f"{_largest(len(shown), done)}; all others follow in the table of runs.")

@@ -736,6 +736,15 @@ def test_study_is_reported_with_its_failures(tmp_path, simulated, capsys):
     assert told in (tmp_path / "q.html").read_text(encoding="utf-8")
 
 
+def test_page_of_failed_runs_alone_does_not_say_that_results_were_left_out(tmp_path, simulated):
+    assert main(arguments(tmp_path / "s", 13)) == 1
+    assert main(["report", str(tmp_path / "s"), "--out", str(tmp_path / "r.html")]) == 0
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "No run has values; why stands under the failures below." in text
+    assert "there is no equilibrium at 13 m/s" in text
+    assert "kept no results" not in text
+
+
 def test_runs_that_ended_early_are_called_so_beside_their_curves_and_peaks():
     results = {"whole": example_result(), "short": example_result(status="derailed")}
     (group,) = groups(results)
