@@ -21,7 +21,7 @@ from railsim.assessment.wear_report import wear_report
 from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.definitions.loading import load_comfort_limits
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import InputError, argument_error, listed
+from railsim.errors import argument_error, listed
 from railsim.result import Result
 
 STANDARDS = (*RUNNING, "comfort", "wear", "safety")
@@ -155,7 +155,7 @@ def _by_runs(
                 raise
             short.append(error)
     if not found:
-        raise InputError(fault for error in short for fault in error.faults)
+        raise TooShort(fault for error in short for fault in error.faults)
     remarks = [f"{LEFT_OUT}{error}" for error in short]
     remarks += [remark for name in found for remark in records[name].remarks()]
     for name, result in runs.items():

@@ -82,12 +82,21 @@ def _check(analysis: Analysis) -> None:
 
 
 def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Outcome:
-    """Largest share of each limit; values of comfort, wear and safety."""
+    """Largest share of each limit; values of comfort, wear and safety.
+
+    None, and a remark, where a run ended too early for them: what it is, its status says.
+    """
     from railsim.assessment import assess
     from railsim.assessment.outputs import coarse_remarks
+    from railsim.assessment.record import LEFT_OUT, TooShort
 
     assert result is not None  # a case with this analysis has a run
-    (found,) = assess(result, analysis.standard, limits=analysis.limits, coarse=True)
+    try:
+        (found,) = assess(result, analysis.standard, limits=analysis.limits, coarse=True)
+    except TooShort as error:
+        if result.status == "complete":
+            raise
+        return {}, (f"{LEFT_OUT}{error}",)
     shares: dict[str, float] = {}
     for row in found.worst:
         if not math.isnan(row.share):

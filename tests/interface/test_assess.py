@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 from unittest.mock import Mock
 
 import numpy as np
@@ -20,12 +21,14 @@ from railsim.assessment.wear import wear_law
 from railsim.cli import main
 from railsim.cli.assess import FILES
 from railsim.definitions.loading import load_comfort_limits, load_own_sections
+from railsim.definitions.study.analyses import AssessAnalysis
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import InputError
 from railsim.notation import PATCHES, REQUESTED
 from railsim.plot.assessment import assessment_figure, sections_figure
 from railsim.profiles import load_profile
 from railsim.result import Result
+from railsim.studies.analyses import analysed
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
 FAST = 1.1 * 33.33333
@@ -885,6 +888,19 @@ def test_a_run_that_is_too_short_is_named_and_the_others_are_assessed(standard, 
     assert main(["assess", paths[0], paths[2], *given]) == 2
     faults = capsys.readouterr().err.splitlines()
     assert [line.split(":")[0] for line in faults] == ["first", "last"]
+
+
+@pytest.mark.parametrize("standard", ["comfort", "wear"])
+def test_in_a_study_a_run_that_ended_before_its_assessment_is_no_failure(standard):
+    """It derailed, as its status says, and has no values; a whole run is too short by its input."""
+    asked = {"own": AssessAnalysis(kind="assess", standard=standard)}
+    case = SimpleNamespace(analyses=asked)
+    short = example_result(duration=2.0, rate=100.0, status="derailed")
+    numbers, (remark,) = analysed(case, short)
+    assert not numbers
+    assert remark.startswith("own: not assessed: run: time: ")
+    with pytest.raises(InputError, match="time: "):
+        analysed(case, example_result(duration=2.0, rate=100.0))
 
 
 @pytest.mark.parametrize("instant", [40.0, 63.0])
