@@ -4,6 +4,7 @@ A `Result` never changes: its arrays are read-only, and what is derived from the
 functions beside it.  Arrays that come from a file are read when they are first asked for.
 """
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from dataclasses import replace
@@ -438,13 +439,13 @@ class Result:
             dims = quantity.dims[1:]
             places = chosen_names(dims, self._coordinates, wanted)
             combinations = product(*(self._coordinates[dim] for dim in dims))
-            each = product(*map(range, array.shape[1:]))
-            for labels, at in zip(combinations, each, strict=True):
+            columns = array.reshape(len(array), math.prod(array.shape[1:])).T  # also without rows
+            for labels, values in zip(combinations, columns, strict=True):
                 if any(labels[k] not in chosen for k, chosen in places.items()):
                     continue
                 along = "component" in quantity.dims
                 unit = quantity.component(labels[-1]).unit if along else quantity.unit
-                yield ":".join((name, *labels)), unit, array[:, *at]
+                yield ":".join((name, *labels)), unit, values
 
 
 class FrozenArrays(Mapping[str, Floats]):
