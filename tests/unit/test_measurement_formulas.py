@@ -187,6 +187,20 @@ def test_arc_length_by_distance_mileage_or_speed(axes, mileage, start, expected)
     assert not remarks
 
 
+@pytest.mark.parametrize(
+    ("counts", "end"),
+    [
+        ([0, 0, 0, 1, 1, 2, 2, 2, 3, 3, 3], [30.0, 33.75, 37.5]),  # on at the mean, 30 m in 8 s
+        ([0, 1, 2, 3, 4, 4, 4, 4, 4, 4, 4], [40.0 + 10.0 * k / 6.0 for k in (4, 5, 6)]),
+    ],
+)
+def test_behind_the_last_count_the_way_goes_on_by_less_than_another(counts, end):
+    """A counter of 10 m, each second."""
+    how, time = SimpleNamespace(speed=None, start=None), np.arange(11.0)
+    s, _, _ = position("made", how, time, {"distance": 10.0 * np.array(counts)}, None)
+    assert s[-3:] == pytest.approx(end)
+
+
 @pytest.mark.parametrize("share", [0.003, -0.01])
 def test_distance_and_speed_that_differ_are_said_with_their_difference(share):
     how = SimpleNamespace(speed=None, start=0.0)
