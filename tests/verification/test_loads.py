@@ -1,11 +1,14 @@
 """Load cases and free lengths against statics by hand."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError
+from railsim.kernels.elements import load_component
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 
@@ -193,3 +196,15 @@ def test_wagon_on_y25_bogies_stands_tare_and_laden_where_its_springs_carry_it(st
     # centre bowl and side bearers of a bogie
     carried = 2 * 50e6 + 2 * 0.55e6
     assert lower - carbody == pytest.approx(34000.0 * GRAVITY / carried, rel=1e-4)  # 3.3 mm
+
+
+def test_a_load_is_linear_between_its_rows_and_constant_beyond():
+    """Each component of three loads, one after the other in one table, as numpy interpolates it."""
+    table, starts = np.random.default_rng(5).normal(size=(8, 4)), [0, 4, 5, 8]
+    for first, last in pairwise(starts):
+        rows = table[first:last]
+        rows[:, 0] = np.sort(rows[:, 0])
+        for at in np.concatenate([rows[:, 0], np.linspace(-4.0, 4.0, 33)]):
+            found = [load_component.py_func(table, first, last, at, k) for k in (1, 2, 3)]
+            expected = [np.interp(at, rows[:, 0], rows[:, k]) for k in (1, 2, 3)]
+            assert found == pytest.approx(expected, abs=1e-12)

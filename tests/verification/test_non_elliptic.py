@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.special import elliprd, elliprf
 
 from railsim.contact.table import strip_influence
-from railsim.kernels.non_elliptic import kik_piotrowski
+from railsim.kernels.non_elliptic import kik_piotrowski, non_elliptic_axes
 from railsim.kernels.table_slice import Zone
 
 E_STAR, DELTA, VIRTUAL = 1.1e11, 80e-6, 0.55
@@ -32,6 +34,21 @@ def test_circle_is_the_closed_form():
     found = patch(zone(y, 0.5 * y**2 / R, R + 0.0 * y))
     assert found[0] == pytest.approx(4.0 / 3.0 * E_STAR * DELTA * a, rel=5e-3)
     assert found[1:] == pytest.approx((a, a), rel=5e-3)
+
+
+@pytest.mark.parametrize(("A", "B"), [(1.1, 1.1), (1.1, 4.0), (1.1, 0.3), (0.8, 12.0)])
+@pytest.mark.parametrize("load", [8e3, 70e3])
+def test_patches_of_an_ellipse_are_those_of_hertz(A, B, load):
+    """Semi-axes at unit load; Johnson (1985), equation 4.26, in Carlson's integrals of scipy."""
+    k = brentq(lambda k: A * elliprd(0, 1, k * k) - B * elliprd(0, k * k, 1), 1e-3, 1e3)
+    a1 = (elliprd(0, k * k, 1) / (2.0 * np.pi * E_STAR * A)) ** (1.0 / 3.0)
+    ellipse = a1, k * a1, 1.5 * elliprf(0, k * k, 1) / (np.pi * E_STAR * a1)
+    width = np.sqrt(ellipse[2] * load ** (2.0 / 3.0) / B)
+    y = np.linspace(-width, width, 481)
+    of = zone(y, B * y**2, 0.5 / A + 0.0 * y)
+    strips = strip_influence()
+    found = non_elliptic_axes(of, 0, len(y), 0.0, A, B, ellipse, load, E_STAR, strips)
+    assert found == pytest.approx(ellipse[:2], rel=1e-2)
 
 
 def test_mirrored_contour_has_the_same_patch():

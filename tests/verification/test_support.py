@@ -9,6 +9,7 @@ from railsim.definitions.track.support import PRESETS
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.contact_table import K2, K
+from railsim.kernels.rails import FRICTION, MIDDLE_Y, RAIL_BEND, THIRD_ROLL, locate_rails
 from railsim.kernels.state import N_SCALARS
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import (
@@ -139,6 +140,40 @@ def with_rails(system, height, slope, start=-10.0, ds=0.05, length=20.0):
             s_start=start, ds=ds, coefficients=coefficients, rail=rail, has_irregularity=1
         )
     )
+
+
+def test_plane_of_the_rails_follows_their_polynomials():
+    """Cubics of each rail, far larger than irregularities are; slopes by differences."""
+    model, _ = loaded_wheelset(0.0, preset="p2")
+    rail, start, ds, width = np.random.default_rng(8).normal(0.0, 0.15, (6, 4)), -50.0, 100.0, 1.52
+    system = with_rails(model.system, np.zeros_like, np.zeros_like, start, ds, ds)
+    track = system.track._replace(rail=rail[None], rail_base=width)
+    work, system = work_arrays(system), system._replace(track=track)
+    near, u, h = [], 0.7, 1e-5
+    for at in (u - h, u + h, u):
+        offset = system.frame_offset[system.bodies.frame[system.contact.body[0]]]
+        locate_rails(system, work, start + at - offset)
+        near.append(work.plane[0].copy())
+    cubic = [np.polynomial.Polynomial(row) for row in rail]
+    (y_l, z_l, y_r, z_r), slope, bend, third = (
+        np.array([c.deriv(n)(u) if n else c(u) for c in cubic[:4]]) for n in range(4)
+    )
+    sine = (z_r - z_l) / width
+    cosine = np.cos(np.arcsin(sine))
+    middle = [0.5 * (y_l + y_r), 0.5 * (z_l + z_r)]
+    slopes = [0.5 * (slope[0] + slope[2]), 0.5 * (slope[1] + slope[3])]
+    roll_slope = (near[1] - near[0])[4] / (2.0 * h)
+    expected = [*middle, *slopes, np.arcsin(sine), sine, cosine, roll_slope]
+    # of roll in proportion to the rails' own: its square beside them is left out
+    expected += [
+        *(0.5 * (bend[1] + bend[3]), (bend[3] - bend[1]) / (width * cosine)),
+        *(0.5 * (third[1] + third[3]), (third[3] - third[1]) / (width * cosine)),
+    ]
+    np.testing.assert_allclose(near[2][MIDDLE_Y : THIRD_ROLL + 1], expected, rtol=1e-8)
+    for side, sign in enumerate((-0.5, 0.5)):
+        aside, widening = sign * (y_r - y_l), sign * (slope[2] - slope[0])
+        own = [cubic[4 + side](u), aside, widening, slope[2 * side], bend[2 * side]]
+        np.testing.assert_allclose(work.rail[0, side, FRICTION : RAIL_BEND + 1], own, rtol=1e-12)
 
 
 def dipped_joint(s):
@@ -319,25 +354,30 @@ def test_forces_corrected_by_slopes_are_those_of_the_contact_with_the_rails_move
         recorder = empty_recorder(model, 1)
         loop = system, work, state, derivative, stages, recorder, SCHEMES["fast"], h, chunk
         assert time_loop(*loop)[0] == RUNNING
-        return work.wheel[:, :, [W_Q, W_Y]].copy()
+        return work.wheel[:, :, [W_Q, W_Y]].copy(), work.rail_force[axles, 1:4]
 
-    by_slopes, uncorrected = [], []
+    axles = system.contact.body
+    by_slopes, uncorrected, on_axles, uncorrected_axles = [], [], [], []
     for n in range(1, 600):
-        forces = run(n, 1)
+        forces, _ = run(n, 1)
         waits = work.support_step[:, PENDING] > 0.0
         if not waits.any():
             continue
         r = work.support_step[:, :DOF].copy()
-        np.testing.assert_array_equal(run(n + 1, 0), forces)
-        before = evaluate(system, state)[0].wheel[:, :, [W_Q, W_Y]]
+        again, given = run(n + 1, 0)
+        np.testing.assert_array_equal(again, forces)
+        before = evaluate(system, state)[0]
         trial = state.copy()
         for w in np.flatnonzero(waits):
             u = support_begin(system) + SUPPORT_SIZE * w
             trial[u : u + DOF] += h * r[w]
             trial[u + RATE : u + RATE + DOF] += 1.5 * r[w]
-        there = evaluate(system, trial)[0].wheel[:, :, [W_Q, W_Y]]
-        by_slopes.append((forces - there)[waits])
-        uncorrected.append((before - there)[waits])
+        there = evaluate(system, trial)[0]
+        by_slopes.append((forces - there.wheel[:, :, [W_Q, W_Y]])[waits])
+        uncorrected.append((before.wheel - there.wheel)[waits][:, :, [W_Q, W_Y]])
+        moved = there.rail_force[axles, 1:4]  # Y, Q and the moment about x on each wheelset
+        on_axles.append((given - moved)[waits])
+        uncorrected_axles.append((before.rail_force[axles, 1:4] - moved)[waits])
     by_slopes, uncorrected = np.concatenate(by_slopes), np.concatenate(uncorrected)
     assert len(by_slopes) > 100
     # of corrections of up to 2 % of the wheel load, but for one in 200: at single instants of rough
@@ -349,6 +389,9 @@ def test_forces_corrected_by_slopes_are_those_of_the_contact_with_the_rails_move
     rms = [np.sqrt(np.mean(x**2, axis=(0, 1))) for x in (by_slopes, uncorrected)]
     # of Q next to nothing is left, of Y, where creep slopes are estimates, a quarter
     assert np.all(rms[0] < np.array([0.1, 0.3]) * rms[1])
+    parts = (np.concatenate(x)[usual] for x in (on_axles, uncorrected_axles))
+    rms = [np.sqrt(np.mean(x**2, axis=0)) for x in parts]
+    assert np.all(rms[0] < np.array([0.3, 0.1, 0.1]) * rms[1])
 
 
 def test_factors_between_two_places_are_interpolated():
