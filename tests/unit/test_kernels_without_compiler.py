@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from railsim import load_track, load_vehicle, simulate
+from railsim.contact import creep as contact_creep
 from railsim.contact.creep import LAWS, creep_force
 from railsim.definitions.settings import Settings
+from railsim.kernels import contact_table, creep, creep_laws, creep_table, fastsim, lanes_plain
+from railsim.kernels.contact_table import LOOK_UP_SIZE, N_WEIGHT
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import assemble
@@ -75,3 +78,51 @@ def test_a_run_is_the_same_without_compilation(tmp_path):
         # slopes learn from small differences of forces, round-off over micrometres
         rtol = 1e-7 if name == "fast" else 1e-9
         np.testing.assert_allclose(plain[name], values, rtol=rtol, atol=1e-7, err_msg=name)
+
+
+@pytest.fixture
+def plain(monkeypatch):
+    """Functions of some modules as they are without compilation, sums of eight lanes too."""
+
+    def without_compiler(module):
+        monkeypatch.setattr(module, "rarely", bool, raising=False)
+        for name, thing in list(vars(module).items()):
+            function = getattr(lanes_plain, name, getattr(thing, "py_func", thing))
+            monkeypatch.setattr(module, name, getattr(module, f"{name}_plain", function))
+
+    return without_compiler
+
+
+@pytest.mark.parametrize("tw", [0.3, 1.0, 1.8])
+def test_fields_of_a_patch_are_the_same_without_compilation(tw, plain):
+    """In every patch of a table, beyond its last node of yaw too."""
+    model = assemble(load_vehicle("coach_manchester"), load_track("straight"), Settings())
+    contact = model.system.contact
+    weights, out = np.empty(N_WEIGHT), np.zeros((2, 3, LOOK_UP_SIZE))
+    contact_table.cell_weights(contact, 0.3, 0.8, 1.1, weights)
+    w, roll, y = (size // 2 for size in contact.values.shape[2:5])
+    for found in out:
+        for patch in range(3):
+            contact_table.look_up(contact, 0, patch, y, roll, w, tw, weights, found[patch])
+        plain(contact_table)
+    np.testing.assert_allclose(out[1], out[0], rtol=1e-11, atol=1e-12)
+    assert np.ptp(out[0]) > 0.0
+
+
+def test_creep_forces_are_the_same_without_compilation(plain):
+    """Of random patches, from stick to sliding."""
+    random = np.random.default_rng(2)
+    a, b = random.uniform(2e-3, 6e-3, (2, 12))
+    N = random.uniform(0.0, 9e4, 12)
+    xi_x, xi_y, phi = random.normal(size=(3, 12)) * 10.0 ** random.uniform(-5.0, -2.0, 12)
+
+    def forces():
+        laws = [(law, None) for law in LAWS] + [("adhesion_curve", CURVE)]
+        given = a, b, N, 0.3, xi_x, xi_y, 100.0 * phi
+        return np.array([creep_force(*given, law=law, adhesion_curve=c) for law, c in laws])
+
+    compiled = forces()
+    for module in (contact_creep, creep, creep_laws, creep_table, fastsim):
+        plain(module)
+    scale = np.abs(compiled).max(axis=-1, keepdims=True)
+    np.testing.assert_allclose(forces() / scale, compiled / scale, atol=1e-11)
