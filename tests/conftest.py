@@ -16,6 +16,7 @@ import railsim.contact.stored_table  # uses the class that the fixture replaces
 import railsim.contact.table
 import railsim.model.solutions
 from railsim.contact.table import TableGrid
+from railsim.kernels import lanes_plain
 from railsim.laws import PERMITTED
 from railsim.threads import environment_kept
 
@@ -175,6 +176,19 @@ with contextlib.suppress(ImportError, AttributeError):
 
 
 @pytest.hookimpl(tryfirst=True)
+@pytest.fixture
+def plain(monkeypatch):
+    """Functions of a module of the kernels as they are without compilation, lanes too."""
+
+    def without_compiler(module):
+        monkeypatch.setattr(module, "rarely", bool, raising=False)
+        for name, thing in list(vars(module).items()):
+            function = getattr(lanes_plain, name, getattr(thing, "py_func", thing))
+            monkeypatch.setattr(module, name, getattr(module, f"{name}_plain", function))
+
+    return without_compiler
+
+
 def pytest_collection_modifyitems(config, items):
     """Leave long tests to `tests/check --all`; one that is named but not there is an error."""
     names = {item.nodeid.removeprefix("tests/"): item for item in items}

@@ -1,0 +1,130 @@
+"""Formulas of the kernels by themselves, not compiled, against equations written anew."""
+
+from math import cos, sin
+from types import SimpleNamespace as Record
+
+import numpy as np
+import pytest
+from dynamics import rotation as turn
+from scipy.optimize import approx_fprime
+from scipy.signal import butter
+
+from railsim.kernels import contact_table, rhs, rotation, vibration, wheel_contact
+from railsim.kernels.system import COS_ROLL, FORCE, MOMENT, POSE_SIZE, SIN_ROLL, Y_0, Z_0
+from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA
+
+
+@pytest.mark.parametrize("h", [1e-4, 1e-3, 8e-3])
+def test_high_pass_of_the_wheel_loads_is_that_of_scipy(h):
+    b0, a1, a2, fading = vibration.high_pass.py_func(h)
+    zeros, poles = butter(2, 40.0, "highpass", fs=1.0 / h)
+    assert [b0, -2.0 * b0, b0] == pytest.approx(zeros, rel=1e-10)
+    assert [1.0, a1, a2] == pytest.approx(poles, rel=1e-10)
+    assert fading == pytest.approx(np.exp(-h / 0.1), rel=1e-12)
+
+
+def test_angles_of_eight_lanes_are_those_of_numpy(plain):
+    plain(rotation)
+    for x in ([0.0, 1e-300, -1e-9, 1e-3, 0.02, -0.1, 0.12499, 0.125], np.linspace(-0.99, 0.99, 8)):
+        x = np.array(x)
+        np.testing.assert_allclose(rotation.arc_sine_lanes(x), np.arcsin(x), rtol=2e-15)
+        sine, cosine = rotation.sine_cosine_lanes(x)
+        np.testing.assert_allclose(sine, np.sin(x), rtol=2e-15)
+        np.testing.assert_allclose(cosine, np.cos(x), rtol=2e-15)
+
+
+def wheelset_on_track(seed):
+    """Kernel arrays of a yawed and rolled wheelset on a track that twists, rises and curves.
+
+    With its axes and those after the yaw in the track's, the track's turn omega per metre, the
+    place r of the wheelset, and how it moves with all relative coordinates held, e_x + omega x r.
+    """
+    random = np.random.default_rng(seed)
+    yaw, roll = random.normal(0.0, 0.3, 2)
+    yawed = turn(yaw, 2)
+    axes, relative = yawed @ turn(roll, 0), np.zeros((1, 16))
+    relative[0, :9], relative[0, SIN_ROLL], relative[0, COS_ROLL] = axes.flat, sin(roll), cos(roll)
+    frames, row = random.normal(size=(1, FRAME_SIZE)), random.normal(size=(1, max(Y_0, Z_0) + 1))
+    omega, state = frames[0, OMEGA : OMEGA + 3], random.normal(size=12)
+    r = state[0], state[1] + row[0, Y_0], state[2] + row[0, Z_0]
+    moved = np.array([1.0, 0.0, 0.0]) + np.cross(omega, r)
+    system = Record(bodies=Record(frame=[0], row=row), contact=Record(body=np.zeros(1, np.int64)))
+    return system, Record(frames=frames, relative=relative), state, (axes, yawed), (omega, moved)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_normal_force_does_no_work_along_a_turning_track(seed):
+    """Only its given share of irregular rails; its moments about roll, axle and normal are kept."""
+    system, work, state, (axes, yawed), (omega, moved) = wheelset_on_track(seed)
+    given = np.random.default_rng(seed + 100).normal(size=6)
+    work.rail_force = given[None].copy()
+    wheel_contact.complete_normal_force.py_func(system, work, 0, state)
+    force, moment = work.rail_force[0, :3], work.rail_force[0, 3:6]
+    assert force[1:] == pytest.approx(given[1:3])
+    assert (moment @ yawed[:, 0], moment @ axes[:, 1], moment[2]) == pytest.approx(given[3:])
+    assert force @ moved + moment @ omega == pytest.approx(given[0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_keeps_axleboxes_upright_does_no_work_along_a_turning_track(seed, plain):
+    """Moments about roll and the track's normal are kept, none is left about the axle.
+
+    The couple that is taken away and the force along the track do no work together.
+    """
+    system, work, state, (axes, yawed), (omega, moved) = wheelset_on_track(seed)
+    random = np.random.default_rng(seed + 100)
+    track = turn(random.normal(), 0) @ turn(random.normal(), 1) @ turn(random.normal(), 2)
+    work.frames[0, ATTITUDE : ATTITUDE + 9] = track.flat
+    work.pose = random.normal(size=(1, POSE_SIZE))
+    work.pose[0, :9] = (track @ axes).flat
+    before = work.pose[0].copy()
+    plain(rhs)
+    rhs.hold_axleboxes(system, work, state)
+    force, moment = ((work.pose[0] - before)[k : k + 3] @ track for k in (FORCE, MOMENT))
+    assert [moment @ yawed[:, 0], moment[2]] == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert work.pose[0, MOMENT : MOMENT + 3] @ track @ axes[:, 1] == pytest.approx(0.0, abs=1e-12)
+    assert force[1:] == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert force @ moved + moment @ omega == pytest.approx(0.0, abs=1e-12)
+
+
+def loads(e, stiffness):
+    """N = K e^1.5 + K2 e^2 of three patches."""
+    return stiffness[:3] * e**1.5 + stiffness[3:] * e**2
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_approaches_of_neighbours_are_those_of_the_penetrations_less_what_they_bend(seed):
+    """One that would lift off carries nothing; one that is apart keeps its distance."""
+    random = np.random.default_rng(seed)
+    stiffness = np.concatenate([random.uniform(2e9, 2e10, 3), random.uniform(0.0, 2e10, 3)])
+    p, (a, b) = random.uniform(-4e-5, 1e-4, 3), random.uniform(0.0, 4e-10, 2)
+    e = p.copy()
+    contact_table.coupled_approaches(np.array([[0.0, 0.0], [a, b]]), 1, stiffness, e)
+    bends = np.array([[0.0, a, 0.0], [a, 0.0, b], [0.0, b, 0.0]])
+    left = p - bends @ loads(np.maximum(e, 0.0), stiffness)
+    for patch in range(3):
+        if p[patch] <= 0.0:
+            assert e[patch] == p[patch]
+        elif e[patch] > 0.0:
+            assert e[patch] == pytest.approx(left[patch], abs=1e-10)
+        else:
+            assert left[patch] <= 1e-12
+
+
+def test_slopes_of_a_limited_continuation_are_its_derivatives():
+    """Of two values over y and roll, one near, one beyond half of what it is there."""
+
+    def there(x):
+        return 3.0 + 0.4 * x[0] - 0.7 * x[1]
+
+    def here(x):
+        return 0.2 - 0.3 * x[0] + 0.5 * x[1]
+
+    def part(x):
+        return contact_table.allowed_part.py_func(there(x), 0.4, -0.7, here(x), -0.3, 0.5)
+
+    x = np.array([0.1, 0.2])
+    share, part_y, part_roll = part(x)
+    assert there(x) + share * (here(x) - there(x)) == pytest.approx(0.5 * there(x))
+    assert [part_y, part_roll] == pytest.approx(approx_fprime(x, lambda at: part(at)[0]), rel=1e-5)
+    assert contact_table.allowed_part.py_func(3.0, 0.4, -0.7, 2.0, -0.3, 0.5) == (1.0, 0.0, 0.0)
