@@ -1,15 +1,18 @@
 """Formulas of the kernels by themselves, not compiled, against equations written anew."""
 
-from math import cos, sin
+from math import cos, pi, sin
 from types import SimpleNamespace as Record
 
 import numpy as np
 import pytest
 from dynamics import rotation as turn
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import approx_fprime
 from scipy.signal import butter
 
-from railsim.kernels import contact_table, rhs, rotation, vibration, wheel_contact
+from railsim.kernels import contact_table, rhs, rotation, vibration, wheel_contact, wheel_surface
+from railsim.kernels.contact_columns import B_ACROSS, B_HEIGHT, BUMP_SIZE
+from railsim.kernels.contact_table import G_ROLL, G_Y, LOOK_UP_SIZE
 from railsim.kernels.system import COS_ROLL, FORCE, MOMENT, POSE_SIZE, SIN_ROLL, Y_0, Z_0
 from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA
 
@@ -85,6 +88,54 @@ def test_what_keeps_axleboxes_upright_does_no_work_along_a_turning_track(seed, p
     assert work.pose[0, MOMENT : MOMENT + 3] @ track @ axes[:, 1] == pytest.approx(0.0, abs=1e-12)
     assert force[1:] == pytest.approx([0.0, 0.0], abs=1e-12)
     assert force @ moved + moment @ omega == pytest.approx(0.0, abs=1e-12)
+
+
+def surface_of(values, y_0, dy):
+    """Surface of a wheel, heights with their slopes at angles and widths, after another one."""
+    n_phi, n_y, _ = values.shape
+    row = np.zeros((1, 8))
+    row[0, [wheel_surface.N_PHI, wheel_surface.N_Y]] = n_phi, n_y
+    row[0, [wheel_surface.Y0, wheel_surface.DY, wheel_surface.FIRST]] = y_0, dy, 3
+    return Record(surface_row=row, surface=np.vstack([np.ones((3, 4)), values.reshape(-1, 4)]))
+
+
+def test_heights_of_a_wheel_are_scipys_splines_around_and_across():
+    """Node by node value, slope around, slope across and both; constant beside the surface."""
+    values, (y_0, dy), step = np.random.default_rng(4).normal(size=(5, 4, 4)), (-2.0, 1.3), 0.4 * pi
+    surface, y = surface_of(values, y_0, dy), y_0 + dy * np.arange(4)
+    across = [[CubicHermiteSpline(y, v[:, k], v[:, k + 2]) for k in (0, 1)] for v in values]
+    for phi in (0.3, 2.0, 6.0, -0.5, 8.0):
+        i, begin = int(phi % (2.0 * pi) // step), phi // step * step
+        ends = across[i], across[(i + 1) % 5]
+        for at in (-2.5, -1.9, -0.5, 0.9, 1.8, 2.0):
+            inside = min(max(at, y_0), y[-1])
+            e, e_y = (
+                CubicHermiteSpline(
+                    [begin, begin + step], *([end[k](inside, n) for end in ends] for k in (0, 1))
+                )
+                for n in (0, 1)
+            )
+            expected = e(phi), e(phi, 1), e_y(phi) if inside == at else 0.0
+            found = wheel_surface.surface_at.py_func(surface, 0, phi, at)
+            np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_gap_of_a_wheel_that_is_not_round_has_the_slopes_of_its_height():
+    """Over y and roll of the wheelset; the wheel is touched at y - shear roll."""
+    surface = surface_of(np.random.default_rng(6).normal(size=(5, 4, 4)), -2.0, 1.3)
+    shear, x = 0.4, np.array([0.3, -0.2])
+
+    def height(x):
+        return wheel_surface.surface_at.py_func(surface, 0, 0.7, x[0] - shear * x[1])
+
+    look_up, bump = np.zeros(LOOK_UP_SIZE + 2), np.zeros((3, BUMP_SIZE))
+    bump[1, B_HEIGHT], _, bump[1, B_ACROSS] = height(x)
+    given = 2.0, 0.5, -0.3
+    look_up[2 + np.array([0, G_Y, G_ROLL])] = given
+    wheel_surface.raise_gap.py_func(look_up, 2, bump, 1, shear)
+    slopes = approx_fprime(x, lambda at: height(at)[0])
+    expected = np.subtract(given, [height(x)[0], *slopes])
+    assert look_up[2 + np.array([0, G_Y, G_ROLL])] == pytest.approx(expected, abs=1e-6)
 
 
 def loads(e, stiffness):
