@@ -10,11 +10,57 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import approx_fprime
 from scipy.signal import butter
 
-from railsim.kernels import contact_table, rhs, rotation, vibration, wheel_contact, wheel_surface
-from railsim.kernels.contact_columns import B_ACROSS, B_HEIGHT, BUMP_SIZE
+from railsim.kernels import (
+    contact_table,
+    controllers,
+    creepages,
+    driving,
+    rhs,
+    rotation,
+    vibration,
+    wheel_contact,
+    wheel_surface,
+)
+from railsim.kernels.contact_columns import (
+    ANGLE_COS,
+    ANGLE_SIN,
+    B_ACROSS,
+    B_HEIGHT,
+    BUMP_SIZE,
+    C_X,
+    C_Y,
+    C_Z,
+    FOOT_X,
+    FOOT_X_PER_YAW,
+    FOOT_Y,
+    FOOT_Z,
+    NORMAL_Y,
+    NORMAL_Z,
+    PATCH_ROWS,
+    PATCH_SPEED,
+    PHI,
+    RISE,
+    TURN_Y,
+    TURN_Z,
+    XI_X,
+    XI_Y,
+)
 from railsim.kernels.contact_table import G_ROLL, G_Y, LOOK_UP_SIZE
-from railsim.kernels.system import COS_ROLL, FORCE, MOMENT, POSE_SIZE, SIN_ROLL, Y_0, Z_0
-from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA
+from railsim.kernels.rails import (
+    COSINE,
+    MIDDLE_Y,
+    MIDDLE_Z,
+    MOTION_Y_RATE,
+    MOTION_Z_RATE,
+    RAIL_SLOPE,
+    ROLL_SLOPE,
+    SINE,
+    SLOPE_Z,
+)
+from railsim.kernels.state import ARC_LENGTH
+from railsim.kernels.system import COS_ROLL, FORCE, FREE, MOMENT, POSE_SIZE, SIN_ROLL, Y_0, Z_0
+from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA, PSI, TrackTables
+from railsim.kernels.track_frame import PHI as CANT_ANGLE
 
 
 @pytest.mark.parametrize("h", [1e-4, 1e-3, 8e-3])
@@ -36,22 +82,35 @@ def test_angles_of_eight_lanes_are_those_of_numpy(plain):
         np.testing.assert_allclose(cosine, np.cos(x), rtol=2e-15)
 
 
+X = np.array([1.0, 0.0, 0.0])
+
+
+def placed(random, frames):
+    """Bodies of these frames at random nominal positions."""
+    n = len(frames)
+    return Record(kind=np.zeros(n), frame=frames, row=random.normal(size=(n, max(Y_0, Z_0) + 1)))
+
+
+def place(bodies, b, state):
+    """Position of a body in its frame."""
+    return state[6 * b : 6 * b + 3] + np.array([0.0, *bodies.row[b, [Y_0, Z_0]]])
+
+
 def wheelset_on_track(seed):
     """Kernel arrays of a yawed and rolled wheelset on a track that twists, rises and curves.
 
-    With its axes and those after the yaw in the track's, the track's turn omega per metre, the
-    place r of the wheelset, and how it moves with all relative coordinates held, e_x + omega x r.
+    With its axes and those after the yaw in the track's, the track's turn omega per metre, and how
+    the wheelset moves with all relative coordinates held, e_x + omega x r.
     """
     random = np.random.default_rng(seed)
     yaw, roll = random.normal(0.0, 0.3, 2)
     yawed = turn(yaw, 2)
     axes, relative = yawed @ turn(roll, 0), np.zeros((1, 16))
     relative[0, :9], relative[0, SIN_ROLL], relative[0, COS_ROLL] = axes.flat, sin(roll), cos(roll)
-    frames, row = random.normal(size=(1, FRAME_SIZE)), random.normal(size=(1, max(Y_0, Z_0) + 1))
+    frames, bodies = random.normal(size=(1, FRAME_SIZE)), placed(random, [0])
     omega, state = frames[0, OMEGA : OMEGA + 3], random.normal(size=12)
-    r = state[0], state[1] + row[0, Y_0], state[2] + row[0, Z_0]
-    moved = np.array([1.0, 0.0, 0.0]) + np.cross(omega, r)
-    system = Record(bodies=Record(frame=[0], row=row), contact=Record(body=np.zeros(1, np.int64)))
+    moved = X + np.cross(omega, place(bodies, 0, state))
+    system = Record(bodies=bodies, contact=Record(body=np.zeros(1, np.int64)))
     return system, Record(frames=frames, relative=relative), state, (axes, yawed), (omega, moved)
 
 
@@ -88,6 +147,90 @@ def test_what_keeps_axleboxes_upright_does_no_work_along_a_turning_track(seed, p
     assert work.pose[0, MOMENT : MOMENT + 3] @ track @ axes[:, 1] == pytest.approx(0.0, abs=1e-12)
     assert force[1:] == pytest.approx([0.0, 0.0], abs=1e-12)
     assert force @ moved + moment @ omega == pytest.approx(0.0, abs=1e-12)
+
+
+def test_creepages_are_the_velocity_of_the_wheel_against_the_rail():
+    """Of three patches on two wheelsets, in vectors; slopes of second order are left out.
+
+    Wheel: V (e_x + omega x r) + v + a x c.  The rail goes along with the track's sections, its own
+    slope and the turn of its plane; c leads by as much.
+    """
+    random, speed, angles = np.random.default_rng(9), 20.0, np.array([0.3, 0.9, -0.5])
+    system = Record(bodies=placed(random, [1, 0, 0, 1]), contact=Record(body=[2, 0]))
+    state, index = random.normal(size=60), np.array([[0, 1], [1, 0], [1, 1]])
+    patch, plane = random.normal(size=(PATCH_ROWS, 3)), random.normal(size=(2, 16))
+    patch[[RISE, FOOT_X, FOOT_X_PER_YAW]] *= 1e-3
+    patch[[ANGLE_SIN, ANGLE_COS]] = np.sin(angles), np.cos(angles)
+    plane[:, [SLOPE_Z, ROLL_SLOPE]] *= 1e-3
+    plane[:, [SINE, COSINE]] = [[sin(a), cos(a)] for a in (0.2, -0.4)]
+    rail, relative = np.zeros((2, 2, 8)), np.zeros((4, 16))
+    rail[..., RAIL_SLOPE] = 1e-3 * random.normal(size=(2, 2))
+    relative[:, :9] = [(turn(a, 2) @ turn(-a, 0)).ravel() for a in (0.1, 0.3, -0.2, 0.5)]
+    frames, motion = 1e-3 * random.normal(size=(2, FRAME_SIZE)), random.normal(size=(2, 2, 4))
+    work = Record(
+        patch_index=index, patch=patch, plane=plane, rail=rail, relative=relative, frames=frames,
+        rail_motion=motion,
+    )  # fmt: skip
+    creepages.creepages.py_func(system, work, 3, speed, state)
+    for k, (w, side) in enumerate(index):
+        b, slope = system.contact.body[w], rail[w, side, RAIL_SLOPE]
+        omega, r = frames[system.bodies.frame[b], OMEGA : OMEGA + 3], place(system.bodies, b, state)
+        v, u = state[24:].reshape(-1, 3)[2 * b : 2 * b + 2]
+        a = relative[b, :9].reshape(3, 3) @ u
+        lean = turn(np.arctan2(plane[w, SINE], plane[w, COSINE]), 0)
+        c, d = patch[[C_X, C_Y, C_Z], k], np.array([1.0, *patch[[TURN_Y, TURN_Z], k]])
+        n = lean @ [0.0, *patch[[ANGLE_SIN, ANGLE_COS], k]]
+        assert patch[[NORMAL_Y, NORMAL_Z], k] == pytest.approx(n[1:])
+        middle = np.array([0.0, *plane[w, [MIDDLE_Y, MIDDLE_Z]]])
+        along = np.cross(omega, r + c) + np.cross(X * plane[w, ROLL_SLOPE], r + c - middle)
+        along += [0.0, slope, plane[w, SLOPE_Z] - patch[RISE, k]]
+        assert d[1:] == pytest.approx(along[1:], abs=3e-5)
+        foot = lean @ [0.0, *patch[[FOOT_Y, FOOT_Z], k]]
+        leads = patch[FOOT_X, k] - slope * c[1] - d[2] * c[2]
+        leads -= (patch[FOOT_X_PER_YAW, k] + c[1]) * (d[1] - slope)
+        assert c == pytest.approx([leads, *foot[1:]])
+        rest = lean @ [0.0, *motion[w, side, [MOTION_Y_RATE, MOTION_Z_RATE]]]
+        slip = speed * (X + np.cross(omega, r)) + v + np.cross(a, c) - rest
+        rolling = speed * (1.0 + np.cross(omega, r + c)[0]) + v[0]
+        assert patch[PATCH_SPEED, k] == pytest.approx(rolling)
+        t = np.array([0.0, n[2], -n[1]])
+        n, t = n - (d @ n) * X, t - (d @ t) * X  # at right angles to the rail
+        found = patch[[XI_X, XI_Y, PHI], k] * rolling
+        assert found == pytest.approx([d @ slip, t @ slip, a @ n])
+
+
+def test_reference_of_a_free_run_keeps_its_place_in_the_frames():
+    """V' takes up its acceleration along the track; each body loses V' (e_x + omega x r)."""
+    random, n = np.random.default_rng(2), 3
+    system = Record(drive=Record(mode=FREE), bodies=placed(random, [1, 0, 1]))
+    system.bodies.reference = 1
+    frames, state, derivative = random.normal(size=(2, FRAME_SIZE)), *random.normal(size=(2, 50))
+    work, before = Record(frames=0.1 * frames), derivative.copy()
+    rate = driving.speed_change.py_func(system, work, state, derivative)
+    driving.apply_speed_change.py_func(system, work, state, rate, derivative)
+    change = (derivative - before)[6 * n : 12 * n].reshape(n, 6)
+    for b, f in enumerate(system.bodies.frame):
+        omega = work.frames[f, OMEGA : OMEGA + 3]
+        moved = X + np.cross(omega, place(system.bodies, b, state))
+        assert change[b] == pytest.approx([*(-rate * moved), 0.0, 0.0, 0.0])
+    assert derivative[6 * (n + 1)] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_signals_of_the_track_ahead_are_the_slope_of_its_heading_and_its_cant(plain):
+    coefficients = np.random.default_rng(1).normal(size=(3, 6, 4))
+    which, row = np.zeros((2, 6), dtype=np.int64), np.zeros((2, 8))
+    which[:, controllers.KIND] = controllers.CURVATURE, controllers.CANT
+    row[:, controllers.AHEAD_BY] = 2.5
+    track = TrackTables(1.0, 2.0, coefficients, np.zeros((3, 6, 4)), 0, 1.5)
+    system, state = Record(signals=Record(which=which, row=row), track=track), np.zeros(20)
+    plain(controllers)
+    for at, cell, u in ((-1.4, 0, 0.1), (1.2, 1, 0.7), (3.9, 2, 1.4)):
+        heading, cant = (np.polynomial.Polynomial(coefficients[cell, k]) for k in (PSI, CANT_ANGLE))
+        state[ARC_LENGTH] = at
+        found = [controllers.track_signal(system, state, i) for i in (0, 1)]
+        assert found == pytest.approx([heading.deriv()(u), cant(u)])
+    state[ARC_LENGTH] = 4.6
+    assert [controllers.track_signal(system, state, i) for i in (0, 1)] == [0.0, 0.0]
 
 
 def surface_of(values, y_0, dy):
