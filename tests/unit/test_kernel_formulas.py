@@ -17,6 +17,7 @@ from railsim.kernels import (
     driving,
     rhs,
     rotation,
+    step_fast,
     vibration,
     wheel_contact,
     wheel_surface,
@@ -30,10 +31,13 @@ from railsim.kernels.contact_columns import (
     C_X,
     C_Y,
     C_Z,
+    CONTACT_JACOBIAN,
     FOOT_X,
     FOOT_X_PER_YAW,
     FOOT_Y,
     FOOT_Z,
+    J_NORMAL,
+    J_SLIP,
     NORMAL_Y,
     NORMAL_Z,
     PATCH_ROWS,
@@ -231,6 +235,36 @@ def test_signals_of_the_track_ahead_are_the_slope_of_its_heading_and_its_cant(pl
         assert found == pytest.approx([heading.deriv()(u), cant(u)])
     state[ARC_LENGTH] = 4.6
     assert [controllers.track_signal(system, state, i) for i in (0, 1)] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("h", [1e-3, 3.0])
+def test_implicit_damping_of_a_step_solves_its_matrix(h, plain):
+    """(1 + M^-1 D) (a_n - b) = a - b, in y, z and roll and for a slip of two coordinates.
+
+    D of the creep forces is symmetric and taken to a share theta, that of the normal forces is not
+    and taken to a half.
+    """
+    random = np.random.default_rng(7)
+    plain(step_fast)
+    before, given = random.normal(size=(2, 12))
+    J, (mass, roll, damping) = random.normal(size=(2, CONTACT_JACOBIAN)), (0.7, 0.3, 1.9)
+    inverse = np.diag([mass, mass, roll])
+    slip, normal = np.zeros((3, 3)), J[1, J_NORMAL : J_NORMAL + 9].reshape(3, 3)
+    slip[np.triu_indices(3)] = J[1, J_SLIP : J_SLIP + 6] = np.abs(J[1, J_SLIP : J_SLIP + 6])
+    slip = slip + slip.T - np.diag(np.diag(slip))
+    theta = step_fast.implicitness(h * np.trace(inverse @ slip))
+    matrix = np.eye(3) + h * inverse @ (theta * slip + 0.5 * normal)
+    found = given.copy()
+    step_fast.soften_across(J, 1, found, before, 6, mass, roll, h)
+    expected = before[7:10] + np.linalg.solve(matrix, (given - before)[7:10])
+    assert found == pytest.approx([*given[:7], *expected, *given[10:]])
+    lever, found = np.array([1.0, -0.6]), given.copy()
+    inverse = np.diag([mass, roll])
+    theta = step_fast.implicitness(h * damping * lever @ inverse @ lever)
+    matrix = np.eye(2) + theta * h * damping * inverse @ np.outer(lever, lever)
+    step_fast.soften_slip(found, before, 2, 4, lever[1], damping, mass, roll, h)
+    expected = before[[2, 4]] + np.linalg.solve(matrix, (given - before)[[2, 4]])
+    assert found[[2, 4]] == pytest.approx(expected)
 
 
 def surface_of(values, y_0, dy):
