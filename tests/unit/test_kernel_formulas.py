@@ -15,6 +15,7 @@ from railsim.kernels import (
     controllers,
     creepages,
     driving,
+    rail_parts,
     rhs,
     rotation,
     step_fast,
@@ -265,6 +266,22 @@ def test_implicit_damping_of_a_step_solves_its_matrix(h, plain):
     step_fast.soften_slip(found, before, 2, 4, lever[1], damping, mass, roll, h)
     expected = before[[2, 4]] + np.linalg.solve(matrix, (given - before)[[2, 4]])
     assert found[[2, 4]] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("roll", [0.0, 0.004, 0.02, -0.05])
+@pytest.mark.parametrize("y", [-0.03, -0.01, 0.0, 0.012, 0.04])
+def test_a_wheel_beyond_the_tables_of_rails_is_held_at_their_edge(y, roll):
+    """What is left of displacement and roll is added to the edge; within, nothing is left."""
+    tables = Record(shear=[0.4], y0=-0.02, dy=1e-3, roll0=-0.012, droll=1e-3)
+    tables.values = np.zeros((1, 1, 1, 1, 41, 1))
+    stretched, slope = contact_table.stretched_roll(roll)
+    found, found_slope, aside, more = rail_parts.held.py_func(tables, y, roll, stretched, slope)
+    foot = y - 0.4 * roll
+    assert aside == pytest.approx(foot - np.clip(foot, -0.019, 0.019), abs=2e-9)
+    assert (more == 0.0) == (abs(stretched) < 0.011)
+    at_edge = contact_table.stretched_roll(roll - more)
+    assert (found, found_slope) == pytest.approx(at_edge, rel=1e-9)
+    assert found == pytest.approx(np.clip(stretched, -0.011, 0.011), rel=1e-5)
 
 
 def surface_of(values, y_0, dy):
