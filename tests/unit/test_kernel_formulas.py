@@ -164,7 +164,7 @@ def test_creepages_are_the_velocity_of_the_wheel_against_the_rail():
     system = Record(bodies=placed(random, [1, 0, 0, 1]), contact=Record(body=[2, 0]))
     state, index = random.normal(size=60), np.array([[0, 1], [1, 0], [1, 1]])
     patch, plane = random.normal(size=(PATCH_ROWS, 3)), random.normal(size=(2, 16))
-    patch[[RISE, FOOT_X, FOOT_X_PER_YAW]] *= 1e-3
+    patch[RISE] *= 1e-3
     patch[[ANGLE_SIN, ANGLE_COS]] = np.sin(angles), np.cos(angles)
     plane[:, [SLOPE_Z, ROLL_SLOPE]] *= 1e-3
     plane[:, [SINE, COSINE]] = [[sin(a), cos(a)] for a in (0.2, -0.4)]
