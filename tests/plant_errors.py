@@ -128,9 +128,10 @@ def tests_at(planted: Planted, data: CoverageData, most: int) -> list[str]:
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.stmt) and node.lineno <= planted.line <= node.end_lineno
     ]
-    inner = max(statements, key=lambda node: node.lineno)
-    end = inner.body[0].lineno - 1 if isinstance(getattr(inner, "body", None), list) else 0
-    lines = range(inner.lineno, max(end or inner.end_lineno, inner.lineno) + 1)
+    lines = range(0)  # of the decorator of a class there is no statement
+    if inner := max(statements, key=lambda node: node.lineno, default=None):
+        end = inner.body[0].lineno - 1 if isinstance(getattr(inner, "body", None), list) else 0
+        lines = range(inner.lineno, max(end or inner.end_lineno, inner.lineno) + 1)
     (measured,) = [file for file in data.measured_files() if file.endswith(f"/{planted.path}")]
     by_line = data.contexts_by_lineno(measured)
     found = {name for line in lines for name in by_line.get(line, ()) if name}

@@ -29,7 +29,7 @@ from railsim.stability.critical_speed import (
     critical_speed,
 )
 from railsim.stability.diagram import diagram, speeds_about
-from railsim.stability.motion import LeftRange, Stretch
+from railsim.stability.motion import OUTPUT_RATE, LeftRange, Stretch
 from railsim.stability.ramp import ramp, sustained
 from railsim.stability.result import Conicity, CriticalSpeed, OverAmplitude
 from railsim.stability.vehicle_flow import VehicleFlow
@@ -801,6 +801,28 @@ def test_the_step_at_a_speed_that_two_classes_share_is_judged_once(monkeypatch):
     motion._steps = {}
     assert motion.step_at(1.25**17.5) == motion.step_at(1.25**16.5) == 1e-3
     assert judged == [17, 18, 16]
+
+
+def test_a_stretch_passes_from_one_speed_to_the_other_on_the_way_of_their_mean():
+    """Longer ones in parts: the speed falls evenly over them, each begins where the last ended."""
+    motion, tables, begun = object.__new__(motion_of.VehicleMotion), [], []
+
+    def advance(system, state, step, chunk):
+        tables.append(system.drive.table.copy())
+        begun.append((chunk.fresh, state[-1]))
+        return round(chunk.steps / chunk.every)
+
+    motion.system = SimpleNamespace(_replace=lambda drive: SimpleNamespace(drive=drive))
+    motion.step_at, motion.advance = (lambda speed: 1e-3), advance
+    motion._recorder = SimpleNamespace(wheel=np.zeros((100_000, 2, 2, 5)))
+    motion.lateral = lambda rows: np.zeros((rows, 2))
+    duration = 1.5 * motion_of.LONGEST
+    seen = motion.stretch(np.array([-1.0, 0.0, 0.0]), 40.0, 37.0, duration)
+    assert np.array(tables)[:, :, 1].tolist() == [[40.0, 38.0], [38.0, 37.0]]
+    ways = np.diff(np.array(tables)[:, :, 0], axis=1).ravel()
+    assert ways == pytest.approx([39.0 * motion_of.LONGEST, 37.5 * 0.5 * motion_of.LONGEST])
+    assert begun == [(1, 40.0), (0, 38.0)]  # without memory at first
+    assert np.diff(seen.time) == pytest.approx(np.full(len(seen.time) - 1, 1.0 / OUTPUT_RATE))
 
 
 def test_rest_is_not_called_stable_where_hunting_is_named_after_the_body():
