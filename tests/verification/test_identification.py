@@ -15,7 +15,7 @@ import railsim
 from railsim.cli import railsim as command_line
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.identification import Identified
-from railsim.identification.fit import _at_best_shares, _covariance, _stretched
+from railsim.identification.fit import _at_best_shares, _at_bounds, _covariance, _stretched
 from railsim.identification.identified import Place, coloured
 from railsim.identification.parameters import Model, Parameter, blended, parsed, scaled
 from railsim.identification.problem import Problem, Workers
@@ -399,6 +399,19 @@ def test_a_bound_that_keeps_the_value_out_is_said(found, low):
     assert not part.ok
     assert one.remarks[0] not in part.remarks  # said once
     assert not one.unidentified
+
+
+def test_bounds_are_said_where_a_parameter_ends_at_one():
+    """A share of 0 or 1 is one of the profiles itself, and no bound of what is known."""
+    factor = Parameter("damping", ("a",), low=0.5, high=2.0)
+    share = Parameter("wear", profiles=("new", "worn"), low=0.0, high=0.8)
+    for x, said in (
+        ([0.0, 0.4], []),
+        ([np.log(0.5), 0.0], ["damping ends at its bound of 0.5"]),
+        ([np.log(2.0), 0.8], ["damping ends at its bound of 2", "wear ends at its bound of 0.8"]),
+    ):
+        found = [words.partition(":")[0] for words in _at_bounds([factor, share], np.array(x))]
+        assert found == said
 
 
 def test_what_nothing_shows_has_no_deviation_and_no_end_in_the_table(found, tmp_path):
