@@ -35,6 +35,7 @@ FORGET = 2.0  # s, after which the start of a run is forgotten
 LEAD = 100.0  # m, that a run begins ahead, as far as the track is there
 SHORTEST = 4.0  # s
 FEWEST = 6  # frequencies in the band, or in a third-octave band that is compared
+RESTS = 1e-9  # change over the largest value up to which a channel is constant
 DEGREE = 5  # of the spline
 ALIKE = 20.0  # Hz, up to which runs are simulated for comparison
 # where the speed varies nothing is low-passed: what is folded into the band lies far above it
@@ -176,8 +177,10 @@ def prepared(
 ) -> Prepared:
     """Return a measured run ready for comparison in a band of frequencies [Hz].
 
-    Raises InputError: channels that the vehicle does not have or without any value, a band above
-    what was sampled, a run too short or beyond the track.
+    A constant channel is left out with a remark: its deviation from the simulated one would count.
+
+    Raises InputError: channels that the vehicle does not have, no channel that changes, a band
+    above what was sampled, a run too short or beyond the track.
     """
     track = track or track_of(measurement)
     check_channels(measurement.name, measurement, model.vehicle)
@@ -205,9 +208,16 @@ def prepared(
         found = f"{band[0]:g} to {high:g} Hz: {number} frequencies, {f[1]:.3g} Hz apart"
         allowed = f"{FEWEST} at least: a wider band or a longer run"
         raise input_error(measurement.name, found, allowed, key="band")
-    names = tuple(compared(measurement))
+    outputs = outputs_for(compared(measurement).values())
+    constant = _constant(thinner)
+    measurement = measurement.with_remarks(
+        *(
+            f"{name} does not change where runs are compared: a dead sensor? It is left out."
+            for name in constant
+        )
+    )
+    names = tuple(name for name in compared(measurement) if name not in constant)
     channels = tuple(measurement.definition.channels[name] for name in names)
-    outputs = outputs_for([channel.quantity for channel in channels])
     how: dict[str, Any] = {"output_rate": OVERSAMPLED * high, "outputs": outputs}
     if steady:
         outputs["low_pass"] = {"frequency": 2.0 * high}
@@ -221,12 +231,22 @@ def prepared(
         thinner.distance,
     )  # fmt: skip
     values = np.stack([thinner[name] for name in names])
-    if not np.isfinite(values).any():
-        found = "no value where runs are compared"
-        raise input_error(measurement.name, found, "values; 'range', 'missing'?", key="channels")
     share = np.sqrt(2.0 * (high - band[0]) / measurement.rate)
     noise = np.array([np.nan if c.noise is None else c.noise * share for c in channels])
     return Prepared(run, values, names, noise, step, measurement)
+
+
+def _constant(measurement: Measurement) -> list[str]:
+    """Return the channels without a change; raises InputError: there is no other channel."""
+    known = {name: measurement[name] for name in compared(measurement)}
+    known = {name: x[np.isfinite(x)] for name, x in known.items()}
+    found = [n for n, x in known.items() if not len(x) or np.ptp(x) <= RESTS * np.abs(x).max()]
+    if len(found) == len(known):
+        words = "no value where runs are compared"
+        if any(map(len, known.values())):
+            words = f"{', '.join(found)}: no value that changes where runs are compared"
+        raise input_error(measurement.name, words, "values; 'range', 'missing'?", key="channels")
+    return found
 
 
 def _moving(measurement: Measurement) -> Measurement:

@@ -689,6 +689,26 @@ def test_spectra_are_compared_in_third_octaves():
             assert np.argmax(rows) == band
 
 
+def test_a_dead_sensor_is_left_out_and_dead_sensors_alone_are_refused(tmp_path):
+    """All three dead had said 1.84 +- 3 % of a stiffness; through the low pass of 25 Hz as well."""
+    vehicle = quarter()
+    run = railsim.load_measurement(measured(tmp_path, vehicle))
+    model = model_of(vehicle, [run])
+    dead = {name: np.full_like(x, 0.3) for name, x in run.channels.items()}
+    for band in ((0.5, 14.0), (1.0, 3.0)):
+        whole = prepared(run, model, band)
+        spoilt = {**run.channels, "on_body": dead["on_body"]}
+        one = prepared(replace(run, channels=spoilt), model, band)
+        assert one.names == ("on_frame", "axlebox_1_left")
+        assert one.measured == pytest.approx(whole.measured[[0, 2]], rel=1e-12)
+        (said,) = one.measurement.remarks
+        assert said.startswith("on_body does not change where runs are compared: a dead sensor?")
+        assert one.run.settings == whole.run.settings  # simulated with all channels
+        words = "run: channels: on_frame, on_body, axlebox_1_left: no value that changes"
+        with pytest.raises(railsim.InputError, match=words):
+            prepared(replace(run, channels=dead), model, band)
+
+
 def test_a_run_is_prepared_with_its_lead_its_speeds_and_the_noise_in_the_band(tmp_path):
     """White noise of the file's rate has the share 2 (f2 - f1)/rate of its variance in a band.
 
