@@ -274,7 +274,7 @@ class _Run:
 
         measured_thin = {channel.name: thin(channel.measured) for channel in channels}
         simulated_thin = {channel.name: thin(channel.simulated) for channel in channels}
-        remarks += suspicions(measured_thin, simulated_thin, every / part.rate)
+        remarks += suspicions(measured_thin, simulated_thin, selections, every / part.rate)
         said = [f"{run.name}: {words}" for words in (*run.remarks, *remarks)]
         return cls(part, result, channels, said)
 

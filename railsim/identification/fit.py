@@ -289,7 +289,8 @@ def _suspicions(problem: Problem, x: Floats, series: list[Floats], *, clocks: bo
             }
             for rows in (one.measured, values)
         )
-        found = suspicions(measured, simulated, one.step, clocks=clocks)
+        quantities = dict(zip(one.names, one.run.selections, strict=True))
+        found = suspicions(measured, simulated, quantities, one.step, clocks=clocks)
         remarks += [f"{one.run.name}: {words}" for words in found]
     return remarks
 

@@ -8,7 +8,7 @@
 `data.py`           `Measurement`: channels over time, arc length and speed
 `alignment.py`      shift and stretch of the arc length by curvature or irregularities
 `counterpart.py`    simulated counterparts of the channels
-`likeness.py`       measured against simulated: signs, units, clocks
+`likeness.py`       measured against simulated: signs, units, clocks, exchanges
 ==================  ============================================================================
 """
 

@@ -1,4 +1,4 @@
-"""Measured against simulated channels: what looks like a wrong sign, a wrong unit, another clock.
+"""Measured against simulated channels: wrong signs, units and clocks, exchanged channels.
 
 Both series lie at the same places and in the same band.  Of each channel: the correlation at the
 best shift in time, the ratio of the rms values, and how the shift changes over the record.
@@ -6,6 +6,7 @@ best shift in time, the ratio of the rms values, and how the shift changes over 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -104,19 +105,29 @@ def _best(a: Floats, b: Floats, step: float) -> tuple[float, float]:
 
 
 def suspicions(
-    measured: Series, simulated: Series, step: float, *, clocks: bool = True
+    measured: Series,
+    simulated: Series,
+    quantities: Mapping[str, str],
+    step: float,
+    *,
+    clocks: bool = True,
 ) -> list[str]:
     """Return remarks on all channels; delays that all share are one of the place, not said here.
 
-    Without `clocks` on signs and units only: of a model whose phases are not right yet.
+    `quantities`: with their labels, by channel. Without `clocks` not on clocks: of a model whose
+    phases are not right yet.
     """
     found = {name: likeness(measured[name], simulated[name], step) for name in measured}
     clear = [one.lag for one in found.values() if one.correlation > SURE]
     common = float(np.median(clear)) if clear else 0.0
     drifts = [one.drift for one in found.values() if np.isfinite(one.drift)]
     drift = float(np.median(drifts)) if len(drifts) > 1 else 0.0
+    exchanged = _exchanged(found, measured, simulated, quantities, step)
     said = []
     for name, one in found.items():
+        if name in exchanged:
+            said.append(f"{name} is like the simulated {exchanged[name]}, not its own: exchanged?")
+            continue
         own = {"lag": clocks * (one.lag - common), "drift": clocks * (one.drift - drift)}
         said.append(replace(one, **own).remark(name, step))
     if clocks and abs(drift) > APART * step:
@@ -125,3 +136,26 @@ def suspicions(
             "record: the mileage or the clock drifts."
         )
     return [words for words in said if words]
+
+
+def _exchanged(
+    found: Mapping[str, Likeness],
+    measured: Series,
+    simulated: Series,
+    quantities: Mapping[str, str],
+    step: float,
+) -> dict[str, str]:
+    """Return pairs of channels of one quantity that are each like the other's simulated one.
+
+    They are less like their own, of either sign: loads of both sides are opposite in curves.
+    """
+    pairs: dict[str, str] = {}
+    unlike = (name for name, one in found.items() if one.correlation < ALIKE)
+    for pair in combinations(unlike, 2):
+        kinds = {quantities[name].partition(":")[0] for name in pair}
+        if len(kinds) == 1 and all(
+            _best(measured[a], simulated[b], step)[0] > max(SURE, abs(found[a].correlation))
+            for a, b in (pair, pair[::-1])
+        ):
+            pairs |= {pair[0]: pair[1], pair[1]: pair[0]}
+    return pairs

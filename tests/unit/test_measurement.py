@@ -277,14 +277,40 @@ def test_signs_units_delays_and_clocks_that_look_wrong_are_said(changes, words):
         own = {"factor": 1.0, "late": 0.0, "drift": 0.0, **changes.get(name, {})}
         at = time - own["late"] - own["drift"] * time / time[-1]
         measured[name] = own["factor"] * signal(k, at)
-    found = suspicions(measured, simulated, step)
+    quantities = {"a": "Q:1:left", "b": "Q:1:right", "c": "Y:1:right"}
+    found = suspicions(measured, simulated, quantities, step)
     assert len(found) == min(len(words), 1)
     assert all(word in text for word in words for text in found)
     for milliseconds in re.findall(r"apart .*by (\S+) ms", " ".join(found)):
         assert float(milliseconds) == pytest.approx(200.0, abs=1e3 * step)
     of_clocks = any("drift" in own or "late" in own for own in changes.values())
-    without = suspicions(measured, simulated, step, clocks=False)
+    without = suspicions(measured, simulated, quantities, step, clocks=False)
     assert without == ([] if of_clocks else found)
+
+
+@pytest.mark.parametrize("shared", [0.0, -0.95])
+def test_exchanged_channels_are_told_from_reversed_ones(shared):
+    """Loads of both sides are opposite in curves: their correlation is `shared`.
+
+    Two channels of one quantity with each other's values are exchanged; two of other signs are
+    not, nor is one alone, nor what two quantities read of each other.
+    """
+    a, noise, c = np.random.default_rng(5).standard_normal((3, 4000))
+    b = shared * a + np.sqrt(1.0 - shared**2) * noise
+    simulated = {"QL": a, "QR": b, "YL": c}
+    quantities = {"QL": "Q:1:left", "QR": "Q:1:right", "YL": "Y:1:left"}
+    exchanged = suspicions({"QL": b, "QR": a, "YL": c}, simulated, quantities, 0.01)
+    assert exchanged == ["QL is like the simulated QR, not its own: exchanged?",
+                         "QR is like the simulated QL, not its own: exchanged?"]  # fmt: skip
+    reversed_ = suspicions({"QL": -a, "QR": -b, "YL": c}, simulated, quantities, 0.01)
+    assert [words[:25] for words in reversed_] == [
+        "QL has the opposite sign ",
+        "QR has the opposite sign ",
+    ]
+    one = suspicions({"QL": -a, "QR": b, "YL": c}, simulated, quantities, 0.01)
+    assert [words[:25] for words in one] == ["QL has the opposite sign "]
+    other = suspicions({"QL": c, "QR": b, "YL": a}, simulated, quantities, 0.01)
+    assert not [words for words in other if "exchanged" in words]
 
 
 def test_resampling_keeps_what_is_slow_and_folds_nothing(tmp_path):

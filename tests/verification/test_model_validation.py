@@ -195,6 +195,18 @@ def test_swapped_signs_wrong_units_and_late_channels_are_said(measured, right):
     assert "Q1L" not in said
 
 
+def test_exchanged_sides_and_axes_are_said(measured, right):
+    """Loads of the wrong sides were called reversed, accelerations along the wrong axes nothing."""
+    channels = dict(measured.channels)
+    for a, b in (("Q1L", "Q1R"), ("frame1y", "frame1z")):
+        channels[a], channels[b] = channels[b], channels[a]
+    said = railsim.validate_model(replace(measured, channels=channels), right).remarks
+    found = {words.split(": ", 1)[1] for words in said if "exchanged?" in words}
+    pairs = ("Q1L", "Q1R"), ("Q1R", "Q1L"), ("frame1y", "frame1z"), ("frame1z", "frame1y")
+    assert found == {f"{a} is like the simulated {b}, not its own: exchanged?" for a, b in pairs}
+    assert "opposite sign" not in "\n".join(said)
+
+
 def test_the_command_writes_its_files_and_fails_on_request(tmp_path, right):
     run = tmp_path / "run.h5"
     right.to_hdf5(run)
