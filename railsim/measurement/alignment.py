@@ -41,6 +41,7 @@ class Shift:
     stretch: float  # change per metre [1]
     correlation: float  # median over the windows that count [1]
     windows: int  # that count
+    near: int  # of those, that lie near the line
     share: float  # of all windows that count and lie near the line
 
 
@@ -94,8 +95,9 @@ def shift_of(
     near = np.abs(shifts - at_zero) < max(10 * STEP, 0.01 * np.ptp(middles))
     if np.count_nonzero(near) > 2:
         stretch, at_zero = np.polyfit(middles[near], shifts[near], 1)
-    share = float(np.sum(np.abs(shifts - at_zero - stretch * middles) < NEAR)) / len(begins)
-    return Shift(float(at_zero), float(stretch), float(np.median(correlations)), len(shifts), share)
+    near = int(np.sum(np.abs(shifts - at_zero - stretch * middles) < NEAR))
+    line, alike = (float(at_zero), float(stretch)), float(np.median(correlations))
+    return Shift(*line, alike, len(shifts), near, near / len(begins))
 
 
 def _lag(a: Floats, b: Floats) -> tuple[float, float]:
@@ -123,7 +125,8 @@ def aligned(
     vertical acceleration of an axlebox against v^2 d2z/ds2 of the rails' mean level, waves of 3 to
     40 m, where the vehicle (given, or named by the file) says how far ahead the axlebox is.
 
-    Raises InputError: no such channel, a track without curves and irregularities, nothing alike.
+    Raises InputError: no such channel, a track without curves and irregularities, nothing alike,
+    no line near half of the windows.
     """
     s = measurement.distance
     grid = np.arange(s[0] - most, s[-1] + most, STEP)
@@ -160,10 +163,15 @@ def aligned(
     if found is None:
         allowed = f"a place known within {most:g} m; the right track; signs and units"
         raise argument_error("track", f"the {words} matches nowhere", allowed)
+    apart = found.windows - found.near
+    if found.near < AGREEING * found.windows:
+        words = f"{apart} of {found.windows} windows of the {words} are not at one shift and drift"
+        raise argument_error("measurement", words, "a counter that does not jump; the right track")
+    jumps = f" {apart} of them lie elsewhere: does the counter jump?" if apart else ""
     return measurement.moved(found.shift, found.stretch).with_remarks(
         f"Aligned by the {words}: {found.shift:+.2f} m at the beginning, "
         f"{1e3 * found.stretch:+.2f} m/km (correlation {found.correlation:.2f} in "
-        f"{found.windows} windows)."
+        f"{found.windows} windows).{jumps}"
     )
 
 

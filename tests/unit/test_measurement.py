@@ -375,12 +375,33 @@ def test_the_place_is_found_by_the_level_of_the_rails():
     run = railsim.load_measurement("coach_25t_run")
     track = railsim.load_track(run.definition.track)
     moved = aligned(run, track)
+    assert "elsewhere" not in moved.remarks[-1]
     late = moved.distance - run.distance + 3.0 + 8e-4 * run.distance
     assert np.abs(late).max() < 0.6
     other = [{"type": "random", "spectrum": "fra_4", "seed": 9}]
     elsewhere = track.replace(irregularities=other)
     with pytest.raises(railsim.InputError, match="matches nowhere"):
         aligned(run, elsewhere)
+
+
+@pytest.mark.parametrize(
+    ("jump", "begin", "words"),
+    [
+        (20.0, 0.35, "are not at one shift and drift"),
+        (40.0, 0.2, "lie elsewhere: does the counter"),
+    ],
+)
+def test_a_counter_that_jumps_is_not_aligned_in_silence(jump, begin, words):
+    """A line through both parts is near neither of them: -10.8 m/km where the drift is -0.8."""
+    run = railsim.load_measurement("coach_25t_run")
+    track = railsim.load_track(run.definition.track)
+    later = np.arange(len(run.distance)) > begin * len(run.distance)
+    jumped = replace(run, distance=run.distance + jump * later)
+    if words.startswith("lie"):
+        assert words in aligned(jumped, track).remarks[-1]
+    else:
+        with pytest.raises(railsim.InputError, match=words):
+            aligned(jumped, track)
 
 
 def test_the_place_is_found_by_curvature(tmp_path):
