@@ -47,7 +47,7 @@ def check_command(vehicle: Vehicle, key: str, name: str, actuators: Sequence[str
         if name in controller.outputs:
             raise argument_error(key, f"'{name}', which controllers.{by} commands", "another one")
     if name not in actuators:
-        allowed = nearest(name, actuators) if actuators else "the vehicle has none"
+        allowed = nearest(str(name), actuators) if actuators else "the vehicle has none"
         raise argument_error(key, f"no actuator '{name}'", allowed)
 
 

@@ -316,16 +316,14 @@ class Simulation:
             if self._rows >= ROWS:
                 self._flush()
 
-    def _call(
-        self, length: float, first: int, steps: int, every: int, *, whole: bool = True
-    ) -> int:
-        """Call the time loop; the number of steps that it has taken."""
+    def _call(self, h: float, first: int, steps: int, every: int, *, whole: bool = True) -> int:
+        """Call the time loop with steps h [s]; the number of steps that it has taken."""
         run = self._run
         kept = 0.0 if whole else run.work.vibration.copy()  # of whole steps
         if not self._records:
             first, every = first + 1, NEVER
         chunk = Chunk(first, steps, every, int(run.fresh), 0, self._rows)
-        run.status, run.where, taken, self._rows = run.call(length, chunk)
+        run.status, run.where, taken, self._rows = run.call(h, chunk)
         if not whole:
             run.work.vibration[:] = kept
         if run.status != RUNNING:
@@ -348,17 +346,26 @@ class Simulation:
             return "the run has ended: its result has been taken"
         return f"the run has ended at {self.time:.6g} s: {self.status_reason}"
 
+    def _check_open(self, what: str) -> None:
+        if self._closed is not None:
+            raise argument_error(what, self._ended_because(), "a new Simulation")
+
     def set(self, actuator: str, value: float) -> None:
         """Give a command to an actuator; it stays until the next one.
 
         Raises
         ------
-        InputError : there is no such actuator, a controller of the vehicle commands it, the value
-            is not finite, or too many commands are on their way to one with a delay.
+        InputError : no such actuator, or one that a controller commands; no finite number; too many
+            commands on their way to an actuator with a delay; the result has been taken.
         """
+        self._check_open("set")
         check_command(self._vehicle, "actuator", actuator, self.actuators)
-        if not math.isfinite(value):
-            raise argument_error("value", f"found {value} for '{actuator}'", "a finite number")
+        try:
+            finite = math.isfinite(value)
+        except TypeError:
+            finite = False
+        if not finite:
+            raise argument_error("value", f"found {value!r} for '{actuator}'", "a finite number")
         run, number = self._run, self.actuators.index(actuator)
         memory = run.work.memory
         if value == memory[run.system.actuators.which[number, COMMAND]]:
@@ -376,6 +383,7 @@ class Simulation:
         `velocity` (float64[wheelset, side, 2]): of the rail heads, lateral (right positive) and
         vertical (down positive) [m], [m/s].
         """
+        self._check_open("set_rails")
         if self._run.system.support.elastic:
             raise argument_error("set_rails", "a track with a support", "rigid rails")
         motion = self._run.work.rail_motion
@@ -413,7 +421,7 @@ class Simulation:
         if name in values:
             value = np.asarray(values[name])
             return float(value[0]) if value.ndim == 1 else value[0].copy()
-        found, allowed = f"nothing is called '{name}'", nearest(name, self.readable)
+        found, allowed = f"nothing is called '{name}'", nearest(str(name), self.readable)
         if name in REQUESTED:
             found, allowed = f"'{name}' is not output", "ask for it in settings.outputs"
         raise argument_error("name", found, allowed)
@@ -429,16 +437,9 @@ class Simulation:
         work.memory[:] = run.work.memory
         work.rail_motion[:] = run.work.rail_motion
         divide_strikes(run.system, work, run.scheme, length, run.state[SPEED])
+        still, chunk = np.zeros_like(state), Chunk(0, 0, 1, int(run.fresh), 1)
         status, where, _, _ = time_loop(
-            run.system,
-            work,
-            state,
-            np.zeros_like(state),
-            run.stages,
-            recorder,
-            run.scheme,
-            length,
-            Chunk(0, 0, 1, int(run.fresh), 1),
+            run.system, work, state, still, run.stages, recorder, run.scheme, length, chunk
         )
         if status != RUNNING:
             run.status, run.where = status, where
@@ -470,10 +471,9 @@ class Simulation:
             raise argument_error("state", found, "record=False")
         self._rows = int(np.searchsorted(recorded, saved.motion[TIME] - SHORTEST))
         run.restore(saved)
-        self._phase, self._missing, self._behind, self._length, self._every, self._goal = (
-            saved.grid[:6]
-        )
-        run.status, run.where = saved.grid[6:8]
+        grid = saved.grid
+        self._phase, self._missing, self._behind, self._length, self._every, self._goal = grid[:6]
+        run.status, run.where = grid[6:8]
         self._seen, self._begun = None, saved.begun
 
     def result(self) -> Result:

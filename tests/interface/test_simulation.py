@@ -275,6 +275,10 @@ def test_faults_are_one_line_each(coach, track):
     for wrong, words in (
         (lambda: sim.set("pusch", 1.0), "no actuator 'pusch'.*push"),
         (lambda: sim.set("push", float("nan")), "value: found nan"),
+        (lambda: sim.set("push", "3"), "value: found '3' for 'push'; a finite number"),
+        (lambda: sim.set("push", None), "value: found None for 'push'; a finite number"),
+        (lambda: sim.set(None, 1.0), "no actuator 'None'"),
+        (lambda: sim.read(None), "nothing is called 'None'"),
         (lambda: sim.step(-1.0), "dt: found -1.0 s"),
         (lambda: sim.read("R"), "nothing is called 'R'"),
         (lambda: sim.run(until=5.0, duration=1.0), "duration: given together with `until`"),
@@ -291,8 +295,9 @@ def test_faults_are_one_line_each(coach, track):
             sim.run(until=float("nan"))
         sim.step(0.0107)
         assert sim.result().status == "complete"
-        with pytest.raises(InputError, match="its result has been taken"):
-            sim.step(0.01)
+        for late, given in ((sim.step, [0.01]), (sim.set, ["push", 1.0]), (sim.set_rails, [0, 0])):
+            with pytest.raises(InputError, match="its result has been taken"):
+                late(*given)
     passive = railsim.Simulation(coach, track, speed=20.0, duration=0.1)
     with pytest.raises(InputError, match="the vehicle has none"):
         passive.set("push", 1.0)
