@@ -68,6 +68,8 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
         record = {
             "results": list(results),
             "status": {label: result.status for label, result in results.items()},
+            "status_reason": {n: r.attributes.get("status_reason", "") for n, r in results.items()},
+            "compared_up_to": {n: float(r["distance"][-1]) for n, r in results.items()},
             "remarks": {label: list(result.remarks) for label, result in results.items()},
             "conditions": {key: dict(zip(results, unlike[key], strict=True)) for key in unlike},
             "rows": [row.record() for row in rows],

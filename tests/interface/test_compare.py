@@ -177,12 +177,17 @@ def test_peaks_on_random_irregularities_are_said_to_be_of_one_seed(tmp_path, cap
 
 
 def test_a_result_that_ended_early_is_said_to_have(files, tmp_path, capsys):
-    short = example_result(duration=17.0, status="stopped").to_hdf5(tmp_path / "short.h5")
+    short = changed(
+        example_result(duration=17.0, status="stopped"), {"status_reason": "out of patience"}
+    ).to_hdf5(tmp_path / "short.h5")
     assert main(["compare", files[0], str(short), "--quiet"]) == 0
-    assert "short: stopped: ; compared up to s = 340.0 m" in capsys.readouterr().out
+    words = "short: stopped: out of patience; compared up to s = 340.0 m"
+    assert words in capsys.readouterr().out
     assert main(["compare", files[0], str(short), "--json"]) == 0
-    status = json.loads(capsys.readouterr().out)["status"]
-    assert status == {"base": "complete", "short": "stopped"}
+    found = json.loads(capsys.readouterr().out)
+    assert found["status"] == {"base": "complete", "short": "stopped"}
+    assert found["status_reason"]["short"] == "out of patience"
+    assert found["compared_up_to"]["short"] == pytest.approx(340.0)  # 17 s at 20 m/s
 
 
 def test_folder_holds_table_record_and_picture_and_is_kept_without_overwrite(
