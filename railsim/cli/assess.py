@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli import common as cli
-from railsim.errors import Fault, Faults, changed_faults
+from railsim.errors import Fault, Faults, InputError, changed_faults, listed
 
 if TYPE_CHECKING:
     from railsim.assessment import Assessment
@@ -56,9 +56,17 @@ def command(
     from railsim.assessment.record import RUNNING
     from railsim.assessment.running import OF_LIMITS, by_vehicle
     from railsim.assessment.tables import assessment_lines
-    from railsim.studies.gathered import opened
+    from railsim.studies.gathered import opened, without_file
 
     results = opened(_paths(files))
+    for file in files:
+        try:
+            missing = without_file(Path(file))
+        except InputError as error:
+            output.remark(f"runs without a result file are not named: {error}")
+        else:
+            if missing:
+                output.remark(f"no result file in {file} of {len(missing)} runs: {listed(missing)}")
     output.reserve(*FILES)
     changes = {name: how.pop(name) for name in OF_LIMITS}
     check_options(standard, **changes)

@@ -53,6 +53,17 @@ def opened(paths: Sequence[Path]) -> dict[str, Result]:
     return results
 
 
+def without_file(folder: Path) -> list[str]:
+    """Return the runs of a study without a result file: failed, waiting, or its file not kept.
+
+    Raises InputError: its ``study.json`` cannot be read.
+    """
+    if not (index := folder / "study.json").is_file():
+        return []
+    runs = read_index(index).runs
+    return [f"{run.name} ({run.status})" for run in runs if not (folder / run.file).is_file()]
+
+
 def gather(files: Sequence[str]) -> Gathered:
     """Return the runs of result files and of folders.
 

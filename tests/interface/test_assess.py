@@ -782,6 +782,29 @@ def test_command_prints_writes_and_fails_only_when_asked(hunting_file, tmp_path,
     assert main(["assess", str(bad.to_hdf5(tmp_path / "bad.h5")), "--fail"]) == 4
 
 
+def test_runs_of_a_study_without_a_result_are_named(hunting, tmp_path, capsys):
+    """One failed, one is waiting, three were not kept: the verdict is that of the others."""
+    hunting.to_hdf5(tmp_path / "there.h5")
+    ends = ["failed", "waiting", "complete", "complete", "complete"]
+    lacking = [(f"run_{number}", end) for number, end in enumerate(ends, start=1)]
+    runs = [
+        {"name": n, "file": f"{n}.h5", "status": s} for n, s in [("there", "complete"), *lacking]
+    ]
+    inputs = {"vehicles": ["coach_25t"], "tracks": ["straight"], "speeds": [20.0]}
+    index = {"format": "railsim-study-result/1", "status": "incomplete", "inputs": inputs}
+    (tmp_path / "study.json").write_text(json.dumps({**index, "runs": runs}))
+    given = ["assess", str(tmp_path), "--coarse", "--quiet"]
+    assert main(given) == 0
+    words = "of 5 runs: run_1 (failed), run_2 (waiting), run_3 (complete) and 2 more"
+    assert f"no result file in {tmp_path} {words}" in capsys.readouterr().err
+    (tmp_path / "study.json").write_text("{")
+    assert main(given) == 0  # the results are there all the same
+    assert "runs without a result file are not named: " in capsys.readouterr().err
+    (tmp_path / "study.json").unlink()
+    assert main(given) == 0
+    assert "result file" not in capsys.readouterr().err
+
+
 def test_option_of_the_command_leaves_each_vehicle_the_rest_of_its_service_table(
     hunting, hunting_file, tmp_path, capsys
 ):
