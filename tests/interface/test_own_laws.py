@@ -362,6 +362,16 @@ def test_a_signal_may_have_the_name_of_what_it_measures(coach, track):
         assert sim.read("distance") == sim.distance
 
 
+def test_a_late_signal_stands_for_the_quantity_of_its_name(coach, track):
+    """Of 20 samples a second 0.1 s late: after 0.32 s that of 0.2 s is known, 4 m at 20 m/s."""
+    late = {"quantity": "distance", "rate": 20.0, "delay": 0.1}
+    vehicle = coach.replace(signals={"distance": late})
+    with railsim.Simulation(vehicle, track, speed=20.0, until=10.0) as sim:
+        sim.step(0.32)
+        assert sim.read("distance") == pytest.approx(4.0, abs=20.0 * sim.step_length)
+        assert sim.distance == pytest.approx(6.4, abs=0.1)
+
+
 CONTROLLER = binding.Takes("a controller", ("time",), ("v",))
 
 
