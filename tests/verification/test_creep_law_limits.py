@@ -193,3 +193,23 @@ def test_forces_over_their_bounds_do_not_depend_on_the_size_of_the_patch():
     one = next(row for row in small if row["case"] == "spin" and row["law"] == "linear")
     _, _, c23, c33 = (float(c) for c in kalker_coefficients(A / B, 0.28))
     assert one["M_z"] / one["T_y"] == pytest.approx(c33 / c23, rel=1e-9)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.25, 0.5])
+def test_kalkers_printed_coefficients_run_smoothly_over_the_axis_ratio(nu):
+    """Each row lies on the cubic through its four neighbours, over logarithms.
+
+    Both halves of the table meet in the circle. Without a lateral contraction c11 = c22.
+    """
+    short = 0.1 * np.arange(1.0, 10.5)
+    narrow, long = (np.array(kalker_coefficients(ratio, nu)) for ratio in (short, 1.0 / short))
+    np.testing.assert_allclose(narrow[:, -1], long[:, -1], rtol=1e-12)
+    x = np.log(short)
+    for half in (narrow, long):
+        for y in np.log(half):
+            for i in range(10):
+                near = [k for k in sorted(range(10), key=lambda k: abs(k - i)) if k != i][:4]
+                cubic = np.polynomial.Polynomial.fit(x[near], y[near], 3)
+                assert y[i] == pytest.approx(cubic(x[i]), abs=0.1 if i in (0, 9) else 0.01)
+        if nu == 0.0:
+            np.testing.assert_allclose(half[0], half[1], rtol=1e-12)

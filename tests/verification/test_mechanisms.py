@@ -335,11 +335,13 @@ def test_a_spring_is_drawn_from_pin_to_pin_as_wide_as_a_part_of_its_first_length
         '[joints.pin]\nrevolute = ["ground.pin", "arm.pin"]\n'
         '[elements.coil]\nspring = ["ground.foot", "arm.end"]\n'
         "stiffness = 1e3\nfree_length = 1.0\n"
+        '[elements.gas]\ngas_spring = ["ground.foot", "arm.end"]\n'
+        "F1 = 100.0\nprogression = 1.2\nstroke = 1.2\nextended = 2.0\n"
         '[driver]\nangle = "arm"\nstart = 0.2\nend = 1.8\n'
     )
     model = build(load_mechanism(path))
     motion = solve(model, np.linspace(model.start, model.end, 11))
-    (coil,) = [line.xy for line in lines(motion) if line.kind == "spring"]
+    coil, gas = (line.xy for line in lines(motion) if line.kind == "spring")
     ends = np.stack((np.cos(motion.s), np.sin(motion.s)), axis=-1)
     np.testing.assert_allclose(coil[:, 0], np.broadcast_to([-0.3, -0.5], ends.shape), atol=1e-12)
     np.testing.assert_allclose(coil[:, -1], ends, atol=1e-12)
@@ -348,6 +350,11 @@ def test_a_spring_is_drawn_from_pin_to_pin_as_wide_as_a_part_of_its_first_length
     beside = np.abs(np.einsum("ik,ijk->ij", along[:, ::-1] * [-1, 1], coil - coil[:, :1]))
     width = np.max(beside, axis=1) / length
     assert width == pytest.approx(np.full(11, length[0] / 24.0), rel=1e-9)
+    # the tube is nearly as long as the spring fully compressed, and keeps its length
+    reach = np.einsum("ik,ijk->ij", along, gas - gas[:, :1]) / length[:, None]
+    tube, rod = np.sort(np.unique(reach.round(9), axis=1))[:, 1:3].T
+    assert tube == pytest.approx(np.full(11, 0.9 * (2.0 - 1.2)), abs=1e-6)
+    assert rod == pytest.approx(length, abs=1e-6)
 
 
 @pytest.mark.parametrize("lift", [1, 2, 3])
