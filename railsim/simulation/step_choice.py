@@ -196,8 +196,13 @@ class StepChoice:
         model = replace(model, system=with_steepest_dampers(model.system))
         level, uneven = level_track_with_friction(model.system), uneven_rigid_rails(model.system)
         level = level._replace(track=level.track._replace(has_irregularity=uneven))
-        if len(rows := model.system.support.variation):  # judged on the stiffest rails
-            support = model.system.support._replace(variation=rows.max(axis=0, keepdims=True))
+        support = model.system.support
+        if len(rows := support.variation):
+            # judged on the stiffest rails; without masses, on the least damped ones: their rate is
+            # (k_contact + k)/c, which `rk4` alone has to follow
+            least = support.massless and self._settings.scheme == "rk4"
+            factors = np.min(rows, axis=0) if least else np.max(rows, axis=0)
+            support = support._replace(variation=factors[None])
             model = replace(model, system=model.system._replace(support=support))
             level = level._replace(support=support)
             with suppress(NotConverged):  # then where the vehicle stands on those without factor

@@ -317,6 +317,16 @@ def test_nothing_moves_on_smooth_straight_rails(vehicle, speed, support, transie
     assert np.abs(result.Q - result.Q[0]).max() < 1e-3
 
 
+@pytest.mark.usefixtures("small_contact_tables")
+def test_stiffer_rails_ahead_make_no_step_of_rk4_too_long():
+    """Without masses rails follow at (k_contact + k)/c: the least damped ones ask for most."""
+    rows = [[0.0, 1.0], [300.0, 2.0]]
+    track = load_track("straight").replace(support={"preset": "ballasted", "variation": rows})
+    coach, settings = load_vehicle("coach_manchester"), Settings(scheme="rk4")
+    result = simulate(coach, track, speed=20.0, duration=0.1, settings=settings)
+    assert np.abs(result.Q - result.Q[0]).max() < 20.0  # unstable: 1700 N
+
+
 @pytest.mark.parametrize("step", [2.5e-3, 5e-3 / 3.0])
 def test_growth_that_is_judged_is_that_of_a_run(step):
     """A small disturbance grows in the time loop with the largest eigenvalue of the map judged."""
