@@ -300,6 +300,26 @@ def test_rules_of_alignment_at_the_permitted_speed(cant, length, speed, expected
         assert any(expected in remark for remark in remarks), remarks
 
 
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize(
+    ("speed", "expected"),
+    [
+        (18.0, "a cant deficiency of 165 mm"),  # I + d = 1500 * 324/(9.81 * 300) = 165.1 mm
+        (4.0, "a cant excess of 112 mm"),  # 8.2 mm less the cant of 120 mm
+    ],
+)
+def test_a_curve_is_judged_where_its_cant_is_worst(speed, expected, sense):
+    """No cant at the begin of the circle, 120 mm a third along it, 60 mm in its middle."""
+    plan = [{"type": "CIR", "length": 300.0, "radius": sense * 300.0}]
+    cant = [
+        {"type": "CST", "length": 50.0, "cant": 0.0},
+        {"type": "LIR", "length": 50.0},
+        {"type": "LIR", "length": 100.0, "cant_start": sense * 0.12, "cant_end": 0.0},
+    ]
+    remarks = [str(remark) for remark in track_remarks(track(plan, cant, speed=speed))]
+    assert [r for r in remarks if expected in r and "plan.0" in r]
+
+
 def test_cant_list_shorter_than_the_plan_is_usual():
     track_ = track([CIRCLE, {**CIRCLE, "length": 500.0}], [CANTED])
     assert track_remarks(track_) == []

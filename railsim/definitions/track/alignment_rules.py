@@ -50,6 +50,12 @@ def cant_at(cant: Sequence[Section], s: float) -> float:
     return cant[-1].end_value if cant else 0.0
 
 
+def corners(element: Section, cant: Sequence[Section]) -> list[float]:
+    """Arc lengths of an element of the plan between which its cant is linear, from end to end."""
+    inside = [one.end for one in cant if element.begin < one.end < element.end]
+    return [element.begin, *inside, element.end]
+
+
 def _curves(plan: Sequence[Section], cant: Sequence[Section], speed: float) -> Iterator[Remark]:
     most = MOST_CANT_HIGH_SPEED if 3.6 * speed >= HIGH_SPEED else MOST_CANT
     at = f"at {3.6 * speed:.0f} km/h"
@@ -57,14 +63,16 @@ def _curves(plan: Sequence[Section], cant: Sequence[Section], speed: float) -> I
         if section.type != "CIR":
             continue
         kappa = section.start_value
-        h = cant_at(cant, 0.5 * (section.begin + section.end))
-        d, small = 1e3 * abs(h), max(0.5 * (1.0 / abs(kappa) - 100.0), 0.0)
-        outwards = 1e3 * math.copysign(1.0, kappa) * cant_deficiency(speed, kappa, h)
+        heights = [cant_at(cant, s) for s in corners(section, cant)]
+        d, small = 1e3 * max(map(abs, heights)), max(0.5 * (1.0 / abs(kappa) - 100.0), 0.0)
+        side = 1e3 * math.copysign(1.0, kappa)
+        outwards = [side * cant_deficiency(speed, kappa, h) for h in heights]
+        lack, excess = max(outwards), -min(outwards)
         for found, limit, words, rule in (
             (d, most, f"a cant of {d:.0f} mm", ""),
             (d, small, f"a cant of {d:.0f} mm", "(R - 100 m)/2 = "),
-            (outwards, MOST_DEFICIENCY, f"a cant deficiency of {outwards:.0f} mm {at}", ""),
-            (-outwards, MOST_EXCESS, f"a cant excess of {-outwards:.0f} mm {at}", ""),
+            (lack, MOST_DEFICIENCY, f"a cant deficiency of {lack:.0f} mm {at}", ""),
+            (excess, MOST_EXCESS, f"a cant excess of {excess:.0f} mm {at}", ""),
         ):
             if found > limit * ROUND_OFF:
                 yield Remark(section.key, f"{words} is more than {rule}{limit:.0f} mm")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from railsim.constants import CANT_BASE, NORMAL_GAUGE, WIDENED
 from railsim.definitions.base import Remark
 from railsim.definitions.excitations.measured import Measured
-from railsim.definitions.track.alignment_rules import alignment_remarks, cant_at
+from railsim.definitions.track.alignment_rules import alignment_remarks, cant_at, corners
 from railsim.definitions.track.elements import Section, TrackElement
 from railsim.errors import Fault
 
@@ -287,8 +287,7 @@ def _cant_sides(cant: Sequence[Section], plan: Sequence[Section]) -> list[Remark
     """Remark on cant on a straight and on cant whose outer rail is the lower one."""
     remarks = []
     for element in plan if cant else ():
-        inside = [one.end for one in cant if element.begin < one.end < element.end]
-        ends = [element.begin, *inside, element.end]
+        ends = corners(element, cant)
         # ends and middles of the stretches with one element of the cant
         places = [*ends, *(0.5 * (begin + end) for begin, end in pairwise(ends))]
         pairs = [(element.value(s), cant_at(cant, s)) for s in places]
