@@ -156,6 +156,8 @@ def check_agreement(
         count = max(1, round(interval / settings.step))
         if abs(count * settings.step - interval) > WRITTEN * interval:
             allowed = f"an integer fraction of the output interval {interval:.12g} s"
+            if outputs.low_pass is not None:
+                allowed += ", at which outputs.low_pass takes values"
             faults.append(Fault("settings", "step", f"found {settings.step:.12g} s", allowed))
     faults.check()
 

@@ -236,6 +236,10 @@ def test_wrong_measured_track_is_told(tmp_path, capsys, monkeypatch, csv, words)
             ["--set", "settings.step=0.0007"],
             "step: found 0.0007 s; an integer fraction of the output",
         ),
+        (
+            ["--set", "settings.outputs.low_pass={frequency=80}", "--set", "settings.step=1.25e-3"],
+            "fraction of the output interval 0.001 s, at which outputs.low_pass takes values",
+        ),
         (["--set", "track.irregularities.0.seed=2"], "no member '0' in irregularities"),
         (["--set", "settings.step=1e-12"], "settings.step: 1e-12; must be greater than or equal"),
         (["--set", "settings.step=5"], "settings.step: 5; must be less than or equal to 0.1"),
