@@ -174,7 +174,7 @@ def find_any(name: str | Path) -> Path:
         if str(name) in library_files(kind):
             return find_file(name, kind)
     found = f"'{name}' is a folder" if os.path.isdir(name) else f"no file '{name}'"
-    known = [name for kind in FOLDERS for name in library_files(kind)]
+    known = {name for kind in FOLDERS for name in library_files(kind)}
     hint = nearest(str(name), known).removeprefix("allowed: ")
     raise input_error(name, found, f"a path, or a shipped name: {hint}")
 
