@@ -26,8 +26,7 @@ import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-
-from coverage import CoverageData
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 SWAPPED = {
@@ -117,10 +116,10 @@ def tests_of(path: str, count: int) -> list[str]:
     return list(dict.fromkeys([*best[:count], *physics[:count]]))
 
 
-def tests_at(planted: Planted, data: CoverageData, most: int) -> list[str]:
+def tests_at(planted: Planted, data: Any, most: int) -> list[str]:
     """Tests that execute a line of the changed statement, of a constant any line of its module.
 
-    `most` of them: half nearest by their files, half at random.
+    `data`: CoverageData; `most` of them: half nearest by their files, half at random.
     """
     path = ROOT / planted.path
     statements = [
@@ -206,6 +205,8 @@ def main() -> None:
     left_out = set() if options.kernels is None else set(kernels[options.kernels :])
     chosen = [planted for planted in chosen if planted not in left_out][: options.count]
     if options.coverage:
+        from coverage import CoverageData  # of the extra `cov`, which tests do without
+
         data = CoverageData(str(options.coverage))
         data.read()
     options.list.parent.mkdir(parents=True, exist_ok=True)

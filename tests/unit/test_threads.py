@@ -96,7 +96,11 @@ def test_exception_in_the_block_of_a_pool_kills_its_workers():
 
 
 def test_workers_that_end_by_themselves_in_time_are_not_killed():
+    """By their task: of two threads that ask for an exit status one may get 255."""
     pool = WorkerPool(1)
-    pool.submit(time.sleep, 0.2)
+    task = pool.submit(time.sleep, 0.2)
+    while not task.running():  # what has not begun is cancelled
+        time.sleep(0.001)
     pool.end(60.0)
-    assert [process.exitcode for process in pool.begun] == [0]
+    assert task.result(60.0) is None
+    assert {process.exitcode for process in pool.begun} <= {0, 255}
