@@ -316,7 +316,7 @@ def test_a_model_that_lacks_a_damper_leaves_residuals_that_are_not_white(tmp_pat
     path = measured(tmp_path, quarter(extra=damper), noise=0.01)
     one = railsim.identify(quarter(), path, [PRIMARY, SECONDARY], band=(0.5, 14.0), workers=1)
     assert not all(channel.is_white for channel in one.channels)
-    assert "not white: the model lacks something" in one.remarks[-1]
+    assert "The residuals of no channel are white: the model lacks something" in one.remarks[-1]
     assert max(channel.level for channel in one.channels) > 2.0
     assert one.inflation > 4.0
 
