@@ -113,6 +113,7 @@ def start_state(
         state[ARC_LENGTH] = s
         if steps:
             follow_rails(model, state)
+            # round on the way, but with a row for each wheel: changing rails are looked up by it
             round_ones = ROUND._replace(surface_of=np.full_like(model.wheels.surface_of, -1))
             system = rolling(without_loads(model.system), round_ones, model.check, model.rails)
             system = system._replace(drive=CONSTANT_SPEED)
