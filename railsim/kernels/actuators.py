@@ -38,11 +38,11 @@ from railsim.kernels.vectors import (
 )
 
 # columns of Actuators.which: along the line, along an axis or about one; what the command is;
-# internal state of the lag, else -1; where in `Work.memory` the last command stands, behind it the
-# largest, where those on their way and how many of them; law and its block, first of its states and
-# their number
+# internal state of the lag, else -1; where in `Work.memory` the last command stands, where those on
+# their way and how many of them; law and its block, first of its states and their number
 ACTION, MODE, LAG_STATE, COMMAND, QUEUE, SLOTS, LAW, BLOCK, OWN_STATE, OWN_STATES = range(10)
 WHICH_SIZE = 10
+LARGEST = 1  # the largest command, behind the last one in `Work.memory`
 # values of ACTION: the line, three axes along which it acts, three about which, axle of body 2
 LINE, ALONG, ABOUT, AXLE = 0, 1, 4, 7
 # values of MODE
@@ -91,7 +91,7 @@ def send(actuators, memory, i, value, time):
         memory[k], memory[k + 1] = time, value
         memory[queue] = count + 1
     memory[at] = value
-    memory[at + 1] = max(memory[at + 1], value)
+    memory[at + LARGEST] = max(memory[at + LARGEST], value)
     return True
 
 

@@ -27,7 +27,7 @@ from railsim.simulation.conditions import Inputs, TakenUp, check_agreement
 from railsim.simulation.disturbance import disturb
 from railsim.simulation.first_start import compiled_beside
 from railsim.simulation.outputs import OutputPlan, run_extremes
-from railsim.simulation.run_in import approach, start_state
+from railsim.simulation.run_in import start_state
 from railsim.simulation.run_progress import RunProgress
 from railsim.simulation.sampling import filtering, low_pass_remark, output_words, sampled
 from railsim.simulation.step_choice import StepChoice, inputs_hash
@@ -60,7 +60,7 @@ def prepare(
     unusual += narrow_remarks(model, track.gauge)
     remarks: list[str] = [*balance.remarks, *map(str, unusual), *measured_remarks(track)]
     if before is None:
-        state = start_state(
+        state, on_the_way = start_state(
             model,
             balance,
             track,
@@ -70,8 +70,7 @@ def prepare(
             on_run_in,
             remarks.append if settings.start_state == "steady" else None,
         )
-        way = step * speed * approach(model, track, start, speed, step)
-        remarks += begins_on_sections(model, start - way)
+        remarks += begins_on_sections(model, start - step * speed * on_the_way)
         remarks += disturb(model, balance.Q0, settings, state)
     else:
         state = _taken_up(before.motion, model.n_state)

@@ -13,7 +13,7 @@ import numpy as np
 
 from railsim.arrays import Floats, first_largest
 from railsim.contact.table import TableGrid
-from railsim.kernels.actuators import ABOUT, ACTION, BY_DAMPER, COMMAND, MODE
+from railsim.kernels.actuators import ABOUT, ACTION, BY_DAMPER, COMMAND, LARGEST, MODE
 from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
 from railsim.kernels.system import DIVIDED, UNSETTLED, Support, System
@@ -261,7 +261,7 @@ def commanded_dampers(system: System, names: Sequence[str], memory: Floats, step
         about, of, unit = acts.which[i, ACTION] - ABOUT, bodies.mass, "N s/m"
         if about >= 0:  # x, y, z or an axle
             of, unit = bodies.inertia[:, (0, 1, 2, 1)[about]], "N m s"
-        constant = memory[acts.which[i, COMMAND] + 1]
+        constant = memory[acts.which[i, COMMAND] + LARGEST]
         if step * constant > COMMANDED * of[acts.body[i]].min():
             return (
                 f"The damper {names[i]} was commanded up to {constant:.3g} {unit}. The step "

@@ -78,8 +78,10 @@ def start_state(
     scheme: int,
     progress: Progress | None = None,
     remark: Callable[[str], None] | None = None,
-) -> Floats:
-    """State of the undisturbed vehicle at time 0 and exactly at `start`, float64[n_state].
+) -> tuple[Floats, int]:
+    """State of the undisturbed vehicle at time 0 and exactly at `start`, and the steps before it.
+
+    The state is float64[n_state]; the steps are those of `approach`, over the track as it is.
 
     `start`: arc length of the reference body [m]; `step`, `scheme`: time step [s] and scheme of the
     run; `progress`: called repeatedly with the time simulated so far and the time to simulate [s];
@@ -126,11 +128,11 @@ def start_state(
     steps = approach(model, track, start, speed, step)
     whole = math.floor(start / (speed * step))
     try:
-        return arrived(steps)
+        return arrived(steps), steps
     except InputError:
         if whole <= steps:
             raise
-    return arrived(whole)
+    return arrived(whole), whole
 
 
 def _guided(system: System, check: CheckRails) -> System:

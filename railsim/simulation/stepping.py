@@ -230,12 +230,9 @@ class Simulation:
             raise argument_error("until", "found nan m", "a number")
         else:
             while self.running and until - self.distance > ROUND_OFF * self.speed:
-                self.step(min(self._ahead(), (until - self.distance) / self.speed))
+                steps = self.step_length * (1 if self._run.varies else STEPS)
+                self.step(min(self._missing + steps, (until - self.distance) / self.speed))
         return self.running
-
-    def _ahead(self) -> float:
-        """Time of a good number of whole steps, fewer where the speed changes."""
-        return self._missing + self.step_length * (1 if self._run.varies else STEPS)
 
     def _to_the_end(self) -> None:
         """Advance to the end by whole steps, and hand on the records of up to `STEPS` at once."""
@@ -379,9 +376,12 @@ class Simulation:
     def set_rails(self, displacement: Floats, velocity: Floats) -> None:
         """Displace the rails under the wheels, as another program's bridge or track does.
 
-        They stay so until the next call; on rigid rails only, which they add to.  `displacement`,
-        `velocity` (float64[wheelset, side, 2]): of the rail heads, lateral (right positive) and
-        vertical (down positive) [m], [m/s].
+        They stay so until the next call; on rigid rails only, which they add to.
+
+        Parameters
+        ----------
+        displacement, velocity : float64[wheelset, side, 2]
+            Of the rail heads, lateral (right positive) and vertical (down positive) [m], [m/s].
         """
         self._check_open("set_rails")
         if self._run.system.support.elastic:
@@ -401,7 +401,7 @@ class Simulation:
         """Take note that the run does not follow from its inputs alone from here on."""
         self._seen = self._begun = None
         words = f"{what} were moved from outside: the stored inputs alone give another result."
-        self._run.remarks += [words] * (words not in self._run.remarks)
+        self._run.remarks = list(dict.fromkeys([*self._run.remarks, words]))
 
     def read(self, name: str) -> Any:
         """Return the present value of a signal, or of a quantity of the result [SI].

@@ -36,7 +36,7 @@ def started(vehicle, track, remark=None):
     """Wheel forces and internal states where a run begins, each over its own scale."""
     balance = equilibrium(assemble(vehicle, track, Settings()), SPEED)
     model = balance.model
-    state = run_in.start_state(model, balance, track, 200.0, 1e-3, 0, None, remark)
+    state, _ = run_in.start_state(model, balance, track, 200.0, 1e-3, 0, None, remark)
     work, derivative = work_arrays(model.system), np.zeros_like(state)
     right_hand_side(model.system, work, state, derivative)
     inner = slice(12 * model.index.n_bodies, 12 * model.index.n_bodies + len(work.drive))

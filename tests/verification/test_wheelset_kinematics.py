@@ -76,7 +76,7 @@ def test_creepage_is_the_velocity_of_the_material_against_the_rail_at_the_patch(
     )
     balance = steady(coach, track, Settings(), SPEED)
     system, n = balance.model.system, balance.model.index.n_bodies
-    state = start_state(balance.model, balance, track, start, 1e-3, 0)
+    state, _ = start_state(balance.model, balance, track, start, 1e-3, 0)
     work, _ = evaluate(system, state)
     for k in range(np.count_nonzero(work.patch[ANGLE_COS])):
         w, _side, _ = work.patch_index[k]
