@@ -48,8 +48,8 @@ bogie["elements"]["tilt"] = {
 }
 signals = {
     "speed": {"quantity": "speed"},
-    "curvature": {"quantity": "curvature", "ahead": 8.0},
-    "cant": {"quantity": "cant_angle", "ahead": 8.0},
+    "curvature_ahead": {"quantity": "curvature", "ahead": 8.0},
+    "cant_ahead": {"quantity": "cant_angle", "ahead": 8.0},
     "a": {
         "quantity": "acceleration",
         "body": "front.frame",
@@ -60,7 +60,7 @@ signals = {
 }
 ways = {
     "no tilt": None,
-    "ahead": {"inputs": {"speed": "speed", "curvature": "curvature", "cant": "cant"}},
+    "ahead": {"inputs": {"speed": "speed", "curvature": "curvature_ahead", "cant": "cant_ahead"}},
     "sensors": {"inputs": {"a": "a"}, "memory": 1},
 }
 track = railsim.load_track("curve_r250").replace(
