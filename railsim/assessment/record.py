@@ -129,6 +129,13 @@ class Record:
         names = NEEDED[standard]
         self.need(names, f"settings.outputs.quantities with {', '.join(names)}")
 
+    def part(self, name: str, rows: slice) -> Floats:
+        """Some rows of a quantity; InputError where a value is none, such as of a broken file."""
+        found = self.result.part(name, rows)
+        if not np.isfinite(found).all():
+            raise self.fault(name, "holds values that are no numbers", "a result without")
+        return found
+
     @cached_property
     def alignment(self) -> Alignment:
         """Geometry of the track."""
@@ -190,8 +197,8 @@ class Record:
         if "sensor_acceleration" in self.result:
             names = self.result.coordinates["sensor"]
             order = [names.index(name) for name in self.sensors]
-            acceleration = self.result.part("sensor_acceleration", rows)[:, order]
-            return acceleration, self.result.part("sensor_roll_rate", rows)[:, order]
+            acceleration = self.part("sensor_acceleration", rows)[:, order]
+            return acceleration, self.part("sensor_roll_rate", rows)[:, order]
         speed = self._speed[rows]
         known = self._last and self._last.part_of(rows, speed)
         if known is None:
@@ -209,7 +216,7 @@ class Record:
 
     def _of_motion(self, rows: slice, speed: Floats) -> tuple[Floats, Floats]:
         """Readings from the motion of the bodies."""
-        motion = {name: self.result.part(name, rows) for name in MOTION}
+        motion = {name: self.part(name, rows) for name in MOTION}
         motion["distance"] = self.distance[rows]
         return readings(self.sensors, motion, self.result.bodies, self.alignment, speed)
 

@@ -21,7 +21,7 @@ from railsim.assessment.en14363 import (
     section_values,
 )
 from railsim.assessment.influences import influences
-from railsim.assessment.record import Record
+from railsim.assessment.record import LEFT_OUT, Record
 from railsim.assessment.sections import TestSection, own_sections, track_sections, transitions
 from railsim.assessment.track_quality import D1, D2, D3, TrackQuality, quality_class
 from railsim.assessment.verdict import all_verdicts, overall
@@ -274,7 +274,8 @@ def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
 def _remarks(
     done: Sequence[_Run], zones: Sequence[ZoneReport], limits: RunningLimits
 ) -> tuple[str, ...]:
-    found = [remark for run in done for remark in run.record.remarks()]
+    found = [f"{LEFT_OUT}{run.record.name}: has no section" for run in done if not run.sections]
+    found += [remark for run in done for remark in run.record.remarks()]
     found += [
         f"{run.record.name}: section {s.begin:.0f} to {s.end:.0f} m outside all zones: {s.reason}"
         for run in done

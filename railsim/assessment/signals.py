@@ -91,10 +91,7 @@ class Signals:
         """Quantity over the rows of the widest margin; ``acceleration`` is that of all sensors."""
         if name == "acceleration":
             return self.record.readings(self._rows)[0]
-        found = self.record.result.part(name, self._rows)
-        if not np.isfinite(found).all():
-            raise self.record.fault(name, "holds values that are no numbers", "a result without")
-        return found
+        return self.record.part(name, self._rows)
 
     def _near(self, band: Band | None) -> slice:
         """Rows of the part with the margin of a filter, among those of the widest one."""

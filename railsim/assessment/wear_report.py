@@ -73,7 +73,7 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
     way = np.gradient(record.distance)
     for rows, counted in record.pieces(0.0):
         rows = slice(rows.start + counted.start, rows.start + counted.stop)
-        T_gamma = record.result.part("T_gamma", rows)
+        T_gamma = record.part("T_gamma", rows)
         ways = way[rows, None, None]
         mean += np.sum(T_gamma * ways, axis=0)
         length += float(np.sum(ways))
@@ -82,7 +82,7 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
         # the force on the rail has the sign of the creepage
         area = np.zeros_like(T_gamma)[..., None]
         load = mu = np.full_like(area, np.nan)
-        each, along = T_gamma[..., None], record.result.part("xi_x", rows)[..., None]
+        each, along = T_gamma[..., None], record.part("xi_x", rows)[..., None]
         if patches:
             each, along = (record.result.part(f"patch_{name}", rows) for name in ("T_gamma", "T_x"))
             area, fatigue = _patches(record, rows)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from example_result import BODIES
 from made_record import FINE, Q0, curve, made, track
 from selection import points
 
@@ -383,15 +384,36 @@ def test_result_without_static_wheel_loads_is_an_input_error():
         assess(bare)
 
 
-@pytest.mark.parametrize("name", ["Q", "Y"])
-def test_values_that_are_no_numbers_are_an_input_error(name):
-    def broken(t, s):
-        values = np.full((*s.shape, 2), Q0)
+@pytest.mark.parametrize(
+    ("name", "stored", "standards"),
+    [
+        ("Q", "Q", ["en14363"]),
+        ("Y", "Y", ["en14363"]),
+        ("T_gamma", "T_gamma", ["wear"]),
+        ("accelerations", "body_acceleration", ["en14363", "comfort"]),
+    ],
+)
+def test_values_that_are_no_numbers_are_an_input_error(name, stored, standards):
+    """Also of accelerations, which had no estimate "of too few values", and comfort no words."""
+
+    def broken(t, *of_wheels):
+        last = (4, 2) if of_wheels else (len(BODIES), 3)
+        values = np.full((len(t), *last), Q0 if of_wheels else 0.0)
         values[4_000, 0, 0] = np.nan
         return values
 
-    with pytest.raises(InputError, match=f"{name}: holds values that are no numbers"):
-        assess(made(ON_ZONE_4, 23.0, **{name: broken}))
+    run = made(ON_ZONE_4, 23.0, **{name: broken})
+    for standard in standards:
+        with pytest.raises(InputError, match=f"{stored}: holds values that are no numbers"):
+            assess(run, standard)
+
+
+def test_a_run_without_a_section_is_named_beside_others():
+    """80 m of a run: it reaches no section, and was left out in silence."""
+    runs = {"whole": made(ON_ZONE_4, 23.0), "short": made(ON_ZONE_4, 23.0, until=80.0)}
+    (found,) = assess(runs)
+    assert "not assessed: short: has no section" in found.remarks
+    assert not any("whole" in remark for remark in found.remarks)
 
 
 # for information ----------------------------------------------------------------------------------
