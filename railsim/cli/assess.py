@@ -62,7 +62,7 @@ def command(
     for file in files:
         try:
             missing = without_file(Path(file))
-        except InputError as error:
+        except (InputError, OSError) as error:
             output.remark(f"runs without a result file are not named: {error}")
         else:
             if missing:

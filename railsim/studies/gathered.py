@@ -56,12 +56,15 @@ def opened(paths: Sequence[Path]) -> dict[str, Result]:
 def without_file(folder: Path) -> list[str]:
     """Return the runs of a study without a result file: failed, waiting, or its file not kept.
 
-    Raises InputError: its ``study.json`` cannot be read.
+    Of a study that was killed, which has a journal only, those that had ended.
+
+    Raises InputError: its ``study.json`` cannot be read, or it is running. OSError: its journal
+    cannot be opened.
     """
-    if not (index := folder / "study.json").is_file():
+    if not any((folder / name).is_file() for name in ("study.json", JOURNAL)):
         return []
-    runs = read_index(index).runs
-    return [f"{run.name} ({run.status})" for run in runs if not (folder / run.file).is_file()]
+    runs = ((run, folder / run["file"]) for run in _of_folder(folder)[0])
+    return [f"{run['name']} ({run['status']})" for run, file in runs if not file.is_file()]
 
 
 def gather(files: Sequence[str]) -> Gathered:

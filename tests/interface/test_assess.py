@@ -29,6 +29,7 @@ from railsim.plot.assessment import assessment_figure, sections_figure
 from railsim.profiles import load_profile
 from railsim.result import Result
 from railsim.studies.analyses import analysed
+from railsim.studies.journal import Journal
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
 FAST = 1.1 * 33.33333
@@ -803,6 +804,23 @@ def test_runs_of_a_study_without_a_result_are_named(hunting, tmp_path, capsys):
     (tmp_path / "study.json").unlink()
     assert main(given) == 0
     assert "result file" not in capsys.readouterr().err
+
+
+def test_runs_of_a_killed_study_without_a_result_are_named(hunting, tmp_path, capsys):
+    """It has a journal alone: `study.json` is written where a study ends."""
+    file = hunting.to_hdf5(tmp_path / "there.h5").stat()
+    runs = ("there", "complete", file), ("cut", "failed", None), ("bare", "complete", None)
+    with Journal(tmp_path) as journal:
+        for name, status, found in runs:
+            record = {"name": name, "file": f"{name}.h5", "labels": {}, "status": status}
+            journal.add(record, "key", found)
+    given = ["assess", str(tmp_path), "--coarse", "--quiet"]
+    assert main(given) == 0
+    words = "no result file in {} of 2 runs: cut (failed), bare (complete)"
+    assert words.format(tmp_path) in capsys.readouterr().err
+    with Journal(tmp_path):  # held by a study that goes on
+        assert main(given) == 0
+    assert "are not named: out: another study is writing" in capsys.readouterr().err
 
 
 def test_option_of_the_command_leaves_each_vehicle_the_rest_of_its_service_table(
