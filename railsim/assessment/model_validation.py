@@ -7,7 +7,7 @@ a quantity stand against limits.  Values of sections in which a channel has a ga
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -34,7 +34,7 @@ from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, argument_error, input_error
 from railsim.measurement import Measurement, load_measurement
 from railsim.measurement.alignment import MOST_SHIFT, common_shift
-from railsim.measurement.counterpart import amplified, check_channels, compared, series
+from railsim.measurement.counterpart import amplified, check_channels, compared, rests, series
 from railsim.measurement.likeness import suspicions
 from railsim.notation import SIDES
 from railsim.result import Result
@@ -97,7 +97,7 @@ def validate_model(
         pairs += one.pairs(tests, limits)
         remarks += one.remarks
     if not pairs:
-        allowed = "a longer run, or channels of Q, Y or the body's accelerations"
+        allowed = "a longer run, or channels of Q, Y or the body's accelerations that change"
         raise input_error(runs[0].name, "no section", allowed, "distance")
     Q0 = float(np.mean([np.mean(result["Q0"]) for result in found]))
     comparisons = []
@@ -219,6 +219,7 @@ class _Run:
     result: Result
     channels: list[_Channel]
     remarks: list[str]
+    resting: dict[str, set[float]] = field(default_factory=dict)  # channels: begins of sections
 
     @classmethod
     def of(cls, run: Measurement, result: Result) -> "_Run":
@@ -299,17 +300,24 @@ class _Run:
         judged = [one for one in QUANTITIES.values() if one.name in limits.limits]
         places = {quantity.name: self._places(quantity) for quantity in judged}
         found: list[Pair] = []
+        number = 0
         for section in track_sections(track, tests, service, covered, speed_at):
             if not section.zone:
                 continue
             length = section_length(tests.zones[section.zone], section.speed)
             if section.end - section.begin < length - 1e-6:
                 continue
+            number += 1
             section = replace(section, zone="")  # very large radii are compared as curves
             for quantity in judged:
                 if section.turn or not quantity.curves:
                     for place in places[quantity.name]:
                         found += self._in_section(quantity, section, place)
+        self.remarks += [
+            f"{run.name}: {name} does not change in {len(begins)} of {number} sections: a dead "
+            "sensor? It is left out there."
+            for name, begins in self.resting.items()
+        ]
         return found
 
     def _places(self, quantity: Compared) -> list[_Place]:
@@ -348,6 +356,11 @@ class _Run:
         inside = slice(*np.searchsorted(both[0].s[:, 0], [section.begin, section.end]))
         gaps = (np.mean(channel.unknown[inside]) for channel in channels)
         if (wheel == "inner" and quantity.base != "Q") or any(gap > UNKNOWN for gap in gaps):
+            return []
+        dead = [c for c in channels if rests(c.measured[inside]) and not rests(c.simulated[inside])]
+        for channel in dead:
+            self.resting.setdefault(channel.name, set()).add(section.begin)
+        if dead:
             return []
         outwards, values = RIGHT.get(quantity.base, 0) * section.turn or 1.0, []
         for signal in both:

@@ -22,7 +22,14 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, ModelError, argument_error, input_error
 from railsim.identification.parameters import Model, Parameter
 from railsim.measurement import Measurement
-from railsim.measurement.counterpart import amplified, check_channels, compared, outputs_for, series
+from railsim.measurement.counterpart import (
+    amplified,
+    check_channels,
+    compared,
+    outputs_for,
+    rests,
+    series,
+)
 from railsim.result import Result
 from railsim.simulation import simulate
 from railsim.simulation.remarks import silent
@@ -35,7 +42,6 @@ FORGET = 2.0  # s, after which the start of a run is forgotten
 LEAD = 100.0  # m, that a run begins ahead, as far as the track is there
 SHORTEST = 4.0  # s
 FEWEST = 6  # frequencies in the band, or in a third-octave band that is compared
-RESTS = 1e-9  # change over the largest value up to which a channel is constant
 DEGREE = 5  # of the spline
 ALIKE = 20.0  # Hz, up to which runs are simulated for comparison
 # where the speed varies nothing is low-passed: what is folded into the band lies far above it
@@ -239,11 +245,10 @@ def prepared(
 def _constant(measurement: Measurement) -> list[str]:
     """Return the channels without a change; raises InputError: there is no other channel."""
     known = {name: measurement[name] for name in compared(measurement)}
-    known = {name: x[np.isfinite(x)] for name, x in known.items()}
-    found = [n for n, x in known.items() if not len(x) or np.ptp(x) <= RESTS * np.abs(x).max()]
+    found = [name for name, x in known.items() if rests(x)]
     if len(found) == len(known):
         words = "no value where runs are compared"
-        if any(map(len, known.values())):
+        if any(np.isfinite(x).any() for x in known.values()):
             words = f"{', '.join(found)}: no value that changes where runs are compared"
         raise input_error(measurement.name, words, "values; 'range', 'missing'?", key="channels")
     return found

@@ -17,11 +17,18 @@ from railsim.result.filters import filtered
 from railsim.result.sensors import all_sensors
 
 READINGS = ("sensor_acceleration", "sensor_roll_rate")
+RESTS = 1e-9  # change over the largest value up to which a channel rests
 
 
 def compared(measurement: Measurement) -> dict[str, str]:
     """Return the channels that a vehicle has a counterpart of: their quantities by names."""
     return {n: q for n, q in measurement.quantities.items() if q not in AXES}
+
+
+def rests(x: Floats) -> bool:
+    """Return whether a channel does not change, as of a dead sensor; NaN where it has no value."""
+    known = x[np.isfinite(x)]
+    return not len(known) or bool(np.ptp(known) <= RESTS * np.abs(known).max())
 
 
 def check_channels(file: str, measurement: Measurement, vehicle: Vehicle) -> None:

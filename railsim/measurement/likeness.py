@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.notation import SIDES
 
 Series = Mapping[str, Floats]
 OPPOSITE = -0.5  # correlation
@@ -129,7 +130,10 @@ def suspicions(
             said.append(f"{name} is like the simulated {exchanged[name]}, not its own: exchanged?")
             continue
         own = {"lag": clocks * (one.lag - common), "drift": clocks * (one.drift - drift)}
-        said.append(replace(one, **own).remark(name, step))
+        words = replace(one, **own).remark(name, step)
+        if words.endswith("'reverse'?") and quantities[name].endswith(SIDES):
+            words = f"{words[:-1]}, or that of the other side?"  # loads of both are opposite
+        said.append(words)
     if clocks and abs(drift) > APART * step:
         said.append(
             f"All channels run apart from the simulation by {1e3 * drift:.3g} ms over the "

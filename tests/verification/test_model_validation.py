@@ -207,6 +207,37 @@ def test_exchanged_sides_and_axes_are_said(measured, right):
     assert "opposite sign" not in "\n".join(said)
 
 
+def spoilt(measured, **changed):
+    """A run with other values of some channels, None without them; without the one with gaps."""
+    channels = {**measured.channels, "frame1z": None, **changed}
+    return replace(measured, channels={n: x for n, x in channels.items() if x is not None})
+
+
+def test_sections_in_which_a_channel_rests_are_left_out_and_named(measured, right):
+    """A dead sensor formed statistics: 55 kN throughout failed, from 1500 m on it passed."""
+    load = measured["Q1L"]
+    dead, dying = np.full_like(load, 55e3), np.where(measured.distance < 1500.0, load, 55e3)
+    wanted = railsim.validate_model(spoilt(measured, Q1L=None), right)
+    found = railsim.validate_model(spoilt(measured, Q1L=dead), right)
+    assert len(found["Q_qst"].pairs) == 14
+    assert found["Q_qst"].deviation == pytest.approx(wanted["Q_qst"].deviation, rel=0.2)
+    assert found["Y_over_Q_qst"].sections == wanted["Y_over_Q_qst"].sections == 7
+    (said,) = [words for words in found.remarks if "dead" in words]
+    assert "Q1L does not change in 17 of 17 sections: a dead sensor?" in said
+    found = railsim.validate_model(spoilt(measured, Q1L=dying), right)
+    assert 14 < len(found["Q_qst"].pairs) < 28  # of Q1R in all, of Q1L in the first ones
+    assert abs(found["Q_qst"].mean) < 100.0
+    assert any("Q1L does not change in" in words for words in found.remarks)
+
+
+def test_the_load_of_the_other_side_is_no_more_called_reversed_only(measured, right):
+    """Of two exchanged channels one was not measured: loads of both sides are opposite."""
+    run = spoilt(measured, Q1L=measured["Q1R"], Q1R=None)
+    said = "\n".join(railsim.validate_model(run, right).remarks)
+    assert "Q1L has the opposite sign" in said
+    assert "'reverse', or that of the other side?" in said
+
+
 def test_the_command_writes_its_files_and_fails_on_request(tmp_path, right):
     run = tmp_path / "run.h5"
     right.to_hdf5(run)
