@@ -26,7 +26,7 @@ from railsim.assessment.sections import TestSection, own_sections, track_section
 from railsim.assessment.track_quality import D1, D2, D3, TrackQuality, quality_class
 from railsim.assessment.verdict import all_verdicts, overall
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
-from railsim.definitions.limits import RunningLimits
+from railsim.definitions.limits import ByAxleLoad, RunningLimits
 from railsim.definitions.loading import load_own_sections, load_running_limits
 from railsim.definitions.own_sections import OwnSections
 from railsim.definitions.vehicle.loads import DESIGN
@@ -109,6 +109,7 @@ def assess_running(
     limits = running_limits(standard, file)
     own = _own_sections(sections, runs) if sections else None
     service = service or _service(runs)
+    _known_category(limits, service, file or standard)
     done = []
     populations = _populations(runs)
     for name, result in runs.items():
@@ -171,6 +172,15 @@ def running_limits(standard: str, file: str | Path | None) -> RunningLimits:
     if limits.standard != standard:
         raise input_error(file, repr(limits.standard), f"wanted: '{standard}'", "standard")
     return limits
+
+
+def _known_category(limits: RunningLimits, service: Service, file: str | Path) -> None:
+    """Refuse limits without a factor of the vehicle's category."""
+    Faults(
+        Fault(str(file), f"limits.{name}.k1", f"no '{service.category}'", "the vehicle's category")
+        for name, law in limits.limits.items()
+        if isinstance(law, ByAxleLoad) and service.category not in law.k1
+    ).check()
 
 
 def common_service(runs: Mapping[str, Result], given: Collection[str] = ()) -> Service | None:

@@ -58,7 +58,7 @@ class Assessed:
     @property
     def exceeded(self) -> bool:
         """Whether it is above its limit."""
-        return self.share > 1.0 + ROUNDING
+        return self.estimate.value > self.limit + ROUNDING * abs(self.limit)
 
     @property
     def rank(self) -> float:

@@ -176,13 +176,13 @@ def _annotation_at(annotation: Any, location: Sequence[str | int]) -> Any:
 
 
 def _tag(member: Any) -> str | None:
-    """Return the tag or the value of `kind` or `type` that chooses this member of a union."""
+    """Return the tag or the value of `kind`, `type` or `law` that chooses a member of a union."""
     for note in getattr(member, "__metadata__", ()):
         if isinstance(note, Tag):
             return note.tag
     if not (isinstance(member, type) and issubclass(member, BaseModel)):
         return None
-    for key in ("kind", "type"):
+    for key in ("kind", "type", "law"):
         field = member.model_fields.get(key)
         if field is not None and typing.get_origin(field.annotation) is typing.Literal:
             return str(typing.get_args(field.annotation)[0])

@@ -15,12 +15,14 @@ from pydantic import Field
 
 from railsim.definitions import base
 from railsim.definitions.file_definition import FileDefinition
+from railsim.definitions.own_sections import SHORTEST
 from railsim.definitions.vehicle.bogies import bogie_mass
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 
 Rows = base.RisingRows[base.Positive, base.Positive]
+SectionLength = Annotated[float, Field(strict=True, ge=SHORTEST)]
 Probability = Annotated[float, Field(strict=True, ge=0.5, lt=1.0)]
 ZoneName = Annotated[str, Field(pattern="^[1-4]$")]
 
@@ -199,9 +201,9 @@ class Zone(Sourced):
     """Range, of the admissible one [1]; on straight track [m]"""
     speed: tuple[base.Positive, base.Positive] | None = None
     """Range, of the admissible speed [1]"""
-    section: Rows
+    section: base.RisingRows[base.Positive, SectionLength]
     """Rows [speed up to m/s, length of a section m]"""
-    section_above: base.Positive
+    section_above: SectionLength
     """Length of a section beyond the last row [m]"""
     sections: base.Count
     """Least number of sections"""
@@ -297,7 +299,7 @@ class RunningLimits(FileDefinition):
     """Which evaluation it belongs to"""
     edition: base.Text
     """Edition of the standard"""
-    deciding: tuple[Criteria, ...] = ("safety", "loading")
+    deciding: tuple[Criteria, ...] = Field(("safety", "loading"), min_length=1)
     """Verdicts that decide; the others are for information"""
     zones: dict[ZoneName, Zone] = Field(min_length=1)
     """Test zones 1 to 4"""

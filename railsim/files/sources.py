@@ -9,7 +9,7 @@ import os
 import re
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -292,8 +292,27 @@ def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ..
         raise input_error(path, found, f"{LONGEST_CHAIN} at most", key="extends")
     base = _extended(read_toml(base_path), base_path, kind, (*chain, base_path.resolve()))
     Faults(fault for key in removed for fault in _remove(base, key, str(path))).check()
+    if kind == "limits":
+        Faults(_of_others(base.data, data, (), str(path))).check()
     _merge(base.data, data, (), base.origin, str(path))
     return Source(str(path), base.data, base.origin)
+
+
+def _of_others(
+    table: Mapping[str, Any], changes: Mapping[str, Any], at: KeyPath, file: str
+) -> Iterator[Fault]:
+    """Yield a fault of each value that would bear the source, or the check, of the one it replaces.
+
+    A table with a `source` speaks for all that is below it.
+    """
+    for key in ("source", "checked") if changes.keys() - {"checked"} else ():
+        if table.get(key) and key not in changes:
+            key = ".".join((*at, key))
+            yield Fault(file, key, "missing", "needed beside a value in place of another")
+    for key, value in changes.items():
+        old = table.get(key)
+        if isinstance(value, dict) and isinstance(old, dict):
+            yield from _of_others(old, value, (*at, key), file)
 
 
 def _paths(node: Any, at: KeyPath) -> Iterator[KeyPath]:

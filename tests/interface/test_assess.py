@@ -20,7 +20,11 @@ from railsim.assessment.tables import assessment_lines, tables
 from railsim.assessment.wear import wear_law
 from railsim.cli import main
 from railsim.cli.assess import FILES
-from railsim.definitions.loading import load_comfort_limits, load_own_sections
+from railsim.definitions.loading import (
+    load_comfort_limits,
+    load_own_sections,
+    load_stationary_limits,
+)
 from railsim.definitions.study.analyses import AssessAnalysis
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import InputError
@@ -547,6 +551,39 @@ def test_own_limits_replace_single_values(tmp_path):
     (found,) = assess(steady(1), limits=limits)
     row = rows_of(found, "4", "Y_over_Q")["wheelset 1 outer"]
     assert (row.limit, row.source, row.checked) == (0.7, "our own", True)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("deciding = []", "deciding: 0 values; a list of 1 at least"),
+        ('limits.Q_qst = {vlaue = 1.0, source = "own"}', "unknown key; did you mean 'value'"),
+        ("limits.Q_qst.value = 1.0", "limits.Q_qst.source: missing"),
+        ("statistics.k.safety = 2.0", "statistics.source: missing"),
+        ('zones.4 = {section_above = 1e-9, source = "own"}', "greater than or equal to 5"),
+        (
+            'remove = ["limits.sum_Y.k1.passenger"]',
+            "limits.sum_Y.k1: no 'passenger'; the vehicle's category",
+        ),
+    ],
+)
+def test_limits_at_the_borders_of_what_they_say_are_told_by_file_and_key(text, words, tmp_path):
+    """Some ended without words of their own, in 10^10 sections, or with the source of another."""
+    file = tmp_path / "own.toml"
+    file.write_text(f'format = "railsim-limits/1"\nextends = "en14363"\n{text}\n')
+    with pytest.raises(InputError, match=words) as caught:
+        assess(made(track(STRAIGHT), FAST, until=400.0), limits=file)
+    assert str(caught.value).startswith(str(file))
+
+
+def test_an_own_value_does_not_take_over_that_another_was_checked(tmp_path):
+    checked = tmp_path / "checked.toml"
+    checked.write_text('extends = "stationary"\nunloading = {checked = true}\n')
+    assert load_stationary_limits(checked).unloading.checked
+    own = tmp_path / "own.toml"
+    own.write_text('extends = "checked.toml"\nunloading = {value = 0.5, source = "own"}\n')
+    with pytest.raises(InputError, match=r"own\.toml: unloading\.checked: missing"):
+        load_stationary_limits(own)
 
 
 def test_comfort_of_known_vibration():

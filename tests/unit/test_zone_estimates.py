@@ -184,6 +184,19 @@ def test_a_quantity_exactly_at_its_limit_is_not_above_it(seed):
     assert not report.exceeded
 
 
+def test_a_limit_that_falls_below_zero_is_exceeded():
+    """12 m/s2 less 2 m/s2 per t of a bogie of 6.2 t: the share of it is negative."""
+    laws = {**LIMITS.limits, "frame_y": LIMITS.limits["frame_y"].model_copy(update={"slope": 2e-3})}
+    limits = LIMITS.model_copy(update={"limits": laws})
+    values = made("4", 9, 0.03)
+    service = Service(admissible_speed=40.0, cant_deficiency=0.15, category="passenger")
+    about = Population("", VEHICLE, Q0), values, [v.section for v in values], service, limits
+    (report,) = zone_reports(*about, "simplified")
+    rows = [row for row in report.rows if row.criterion.name == "frame_y"]
+    assert all(row.limit < 0.0 < row.estimate.value for row in rows)
+    assert all(row.exceeded for row in rows)
+
+
 def test_regression_over_several_influences_is_that_of_the_normal_equations():
     """Standard error with N - k - 1 degrees of freedom; share of the variance explained."""
     random = np.random.default_rng(3)
