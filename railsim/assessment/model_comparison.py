@@ -11,6 +11,7 @@ from railsim.arrays import Floats
 from railsim.assessment.criteria import FORCES, RIDE_BAND, both_ends, high, middle, outer_end, rms
 from railsim.assessment.signals import Band
 from railsim.assessment.verdict import FAIL, INCOMPLETE, PASS
+from railsim.assessment.zones import ROUNDING
 from railsim.errors import nearest
 from railsim.table import Amount, Column, Table
 
@@ -107,8 +108,8 @@ class Comparison:
         """Pass, fail, or incomplete with too few sections or one value, which does not scatter."""
         if self.sections < self.least or len(self.pairs) < 2:
             return INCOMPLETE
-        met = abs(self.mean) <= self.mean_limit and self.deviation <= self.limit
-        return PASS if met else FAIL
+        shares = abs(self.mean) / self.mean_limit, self.deviation / self.limit
+        return PASS if max(shares) <= 1.0 + ROUNDING else FAIL
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,6 +86,15 @@ def test_mean_and_deviation_decide_each_and_eleven_sections_do_not():
     assert one.verdict == "incomplete"
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_difference_exactly_at_its_limit_is_not_above_it(seed):
+    """As in `railsim assess`: the sum of twelve differences rounds to either side."""
+    measured = np.random.default_rng(seed).normal(30e3, 3e3, 12)
+    for limit in (5e3, 6e3, 9e3):
+        assert comparison(measured, measured + 2.0 * limit / 3.0, limit).verdict == "pass"
+        assert comparison(measured, measured + 0.667 * limit, limit).verdict == "fail"
+
+
 def simulated(vehicle, until=None, **outputs):
     track = railsim.load_track(FOLDER / "line" / "track.toml")
     settings = {"output_rate": 100.0, "outputs": {**make.OUTPUTS, **outputs}}
