@@ -57,6 +57,13 @@ LIFTED = (
 )
 
 
+ENDS = 0.01  # of the mean axle load, by which those of both ends may differ
+ONE_END = (
+    "axle loads of the two ends differ: guiding is that of the end that leads in the file; test "
+    "the vehicle turned round too"
+)
+
+
 @dataclass(frozen=True)
 class StationaryValue:
     """One quantity of one case, and its limit."""
@@ -208,6 +215,9 @@ def stationary(
     remarks = (*balance.remarks, *left_out(vehicle, track, settings, model))
     if any(value.quantity == UNLOADING and value.value > 1.0 for value in values):
         remarks += (LIFTED,)
+    axles = balance.Q0.sum(axis=1)
+    if np.abs(axles - axles[::-1]).max() > ENDS * axles.mean():
+        remarks += (ONE_END,)
     if vehicle.loads:
         remarks = (f"load case: {vehicle.load or DESIGN}", *remarks)
     if limits.gauge is not None and abs(track.gauge - limits.gauge.value) > WIDENED:

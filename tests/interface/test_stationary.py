@@ -146,6 +146,21 @@ def test_load_to_one_side_is_leant_to_its_own_side():
     assert unloading[0.08] == pytest.approx(unloading[0.0] * Q0 / lighter, rel=0.02)
 
 
+@pytest.mark.usefixtures("guided")
+def test_a_vehicle_whose_ends_differ_is_said_to_be_tested_with_one_of_them_ahead():
+    """Metro trailer with its body 0.8 m off: guiding 0.895 or 0.983, whichever end leads."""
+    on, limits = railsim.load_track("straight"), load_stationary_limits("stationary")
+
+    def said(*changes):
+        metro = railsim.load_vehicle("metro_b_trailer", changes)
+        remarks = stationary(metro, on, limits, cant=0.1).remarks
+        return any("turned round" in remark for remark in remarks)
+
+    assert said("bodies.carbody.position.0=0.8")
+    assert not said("bodies.carbody.position.1=0.05")  # to one side: both hands are tested
+    assert not said()
+
+
 @pytest.mark.usefixtures("by_newton")
 @pytest.mark.parametrize(
     ("vehicle", "friction"), [([], (0.5, 0.2)), (["bodies.carbody.position.1=0.08"], (0.4, 0.4))]
