@@ -98,6 +98,30 @@ def test_every_wheel_runs_to_the_end_of_its_piece_and_points_are_where_they_are(
     assert off["floor_rear"] == pytest.approx(-9.5)
 
 
+def test_a_floor_is_judged_in_the_band_of_its_limit():
+    """2.5 m/s2 hold from 0.4 to 10 Hz: neither 1.3 m/s2 of a curve nor 20 Hz count.
+
+    Order 4: 20 Hz have x = (20^2 - 0.4 10)/(20 (10 - 0.4)) = 2.06, a gain of 0.055; 2 Hz x = 0.
+    """
+    time = np.arange(4000) / 100.0
+    tones = 0.5 * np.sin(2.0 * np.pi * 2.0 * time), 1.0 * np.sin(2.0 * np.pi * 20.0 * time)
+    distance, wheels = SPEED * time, np.zeros((4000, 4, 2))
+
+    class Made(dict):
+        def series(self, *_, **__):
+            return 1.3 + sum(tones)
+
+    at = np.repeat(distance[:, None], 4, axis=1)
+    result = Made(time=time, distance=distance, wheelset_distance=at, Q0=np.ones((4, 2)))
+    result |= {"Q": wheels + 1.0, "Y": wheels, "Y_over_Q": wheels}
+    coach = railsim.load_vehicle("coach_manchester")
+    case = Case("made", coach, railsim.load_track("straight"), railsim.Settings(), SPEED)
+    for quantity, _, _, value, limit in module._signals(case, result):
+        if quantity in ("body_y", "body_z"):
+            assert limit == 2.5
+            assert value[1000:3000].max() == pytest.approx(0.5, abs=0.06)
+
+
 def test_pieces_say_what_one_run_says(judged, recording, tmp_path):
     """Behind a run-in of 200 m nothing is left of where the run began: 2 % of the limits."""
     with pytest.MonkeyPatch.context() as patch:
