@@ -91,11 +91,13 @@ def validate_model(
     pairs: list[Pair] = []
     overlays: list[Overlay] = []
     remarks: list[str] = []
+    lacking: set[str] = set()
     for run, result in zip(runs, found, strict=True):
         one = _Run.of(run, result)
         overlays += one.overlays()
         pairs += one.pairs(tests, limits)
         remarks += one.remarks
+        lacking |= one.lacking
     if not pairs:
         allowed = "a longer run, or channels of Q, Y or the body's accelerations that change"
         raise input_error(runs[0].name, "no section", allowed, "distance")
@@ -103,7 +105,7 @@ def validate_model(
     comparisons = []
     for name, quantity in QUANTITIES.items():
         own = tuple(pair for pair in pairs if pair.quantity == name)
-        if own and name in limits.limits:
+        if (own or name in lacking) and name in limits.limits:
             limit = limits.limits[name].at(Q0)
             mean, least = limits.mean * limit, limits.sections
             comparisons.append(Comparison(quantity, own, limit, mean, least))
@@ -220,6 +222,7 @@ class _Run:
     channels: list[_Channel]
     remarks: list[str]
     resting: dict[str, set[float]] = field(default_factory=dict)  # channels: begins of sections
+    lacking: set[str] = field(default_factory=set)  # quantities that these sections give no value of
 
     @classmethod
     def of(cls, run: Measurement, result: Result) -> "_Run":
@@ -361,6 +364,7 @@ class _Run:
         for channel in dead:
             self.resting.setdefault(channel.name, set()).add(section.begin)
         if dead:
+            self.lacking.add(quantity.name)
             return []
         outwards, values = RIGHT.get(quantity.base, 0) * section.turn or 1.0, []
         for signal in both:

@@ -33,7 +33,7 @@ def _written(unit: str) -> str:
 @styled(SMALL)
 def scatter(validation: ModelValidation) -> Figure:
     """Draw simulated over measured section values with the bands of the mean and the deviation."""
-    shown = validation.comparisons
+    shown = [one for one in validation.comparisons if one.pairs]
     title = f"{unformatted(validation.title)}\n{LIMITS}"
     figure, grid = grid_of(len(shown), 3, 8.0, 2.5, 1.0, title)
     for axes, one in zip(grid, shown, strict=True):
@@ -56,7 +56,7 @@ def scatter(validation: ModelValidation) -> Figure:
 @styled(SMALL)
 def differences(validation: ModelValidation) -> Figure:
     """Draw the distribution of the differences over the limit of their standard deviation."""
-    shown = validation.comparisons
+    shown = [one for one in validation.comparisons if one.pairs]
     figure, grid = grid_of(len(shown), 4, 8.0, 1.8, 0.6)
     for axes, one in zip(grid, shown, strict=True):
         x = np.array([pair.difference for pair in one.pairs]) / one.limit

@@ -239,6 +239,15 @@ def test_sections_in_which_a_channel_rests_are_left_out_and_named(measured, righ
     assert any("Q1L does not change in" in words for words in found.remarks)
 
 
+def test_quantity_whose_only_channels_rest_is_incomplete(measured, right):
+    """Both loads of a wheelset were dead: the table was without them, and the model passed."""
+    dead = np.full_like(measured["Q1L"], 55e3)
+    found = railsim.validate_model(spoilt(measured, Q1L=dead, Q1R=dead), right)
+    assert (found["Q_qst"].sections, found["Q_qst"].verdict) == (0, "incomplete")
+    assert found.verdict == "incomplete"
+    assert len(plots.scatter(found).axes) == len(found.comparisons) - 4  # without those of Q, Y over Q
+
+
 def test_the_load_of_the_other_side_is_no_more_called_reversed_only(measured, right):
     """Of two exchanged channels one was not measured: loads of both sides are opposite."""
     run = spoilt(measured, Q1L=measured["Q1R"], Q1R=None)
