@@ -51,7 +51,9 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
         conditions,
         difference_table,
     )
-    from railsim.plot.overlay import difference_figure, overlay
+
+    if output.folder is not None:  # a picture is drawn: matplotlib takes long to import
+        from railsim.plot.overlay import difference_figure, overlay
 
     cli.goes_with("--out", output.folder, "over")
     groups = _groups(files, output)

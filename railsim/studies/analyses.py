@@ -6,7 +6,7 @@ analysis called ``curve`` in the study begin with ``curve.``.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from railsim.cant import cant_deficiency
 from railsim.definitions.study.analyses import (
@@ -19,7 +19,9 @@ from railsim.definitions.study.analyses import (
 )
 from railsim.errors import Fault, Faults, ModelError
 from railsim.result import Result
-from railsim.studies.case import Case
+
+if TYPE_CHECKING:
+    from railsim.studies.case import Case
 
 Numbers = dict[str, float]
 Outcome = tuple[Numbers, Sequence[str]]
@@ -29,7 +31,7 @@ LARGEST = ("Q", "Y", "Y_over_Q", "dQ_over_Q0", "sum_Y", "attack", "lateral", "ca
 LOCATIONS = ("x", "blocks", "wheelset")  # of comfort points and wheels
 
 
-def analysed(case: Case, result: Result | None) -> tuple[Numbers, list[str]]:
+def analysed(case: "Case", result: Result | None) -> tuple[Numbers, list[str]]:
     """Return the numbers of all analyses of a case, and remarks; raises InputError, ModelError."""
     found: Numbers = {}
     said: list[str] = []
@@ -81,7 +83,7 @@ def _check(analysis: Analysis) -> None:
             checked(contact, analysis.methods, analysis.low, analysis.high)
 
 
-def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Outcome:
+def _assessed(case: "Case", analysis: AssessAnalysis, result: Result | None) -> Outcome:
     """Largest share of each limit; values of comfort, wear and safety.
 
     None, and a remark, where a run ended too early for them: what it is, its status says.
@@ -134,7 +136,7 @@ def _numbers(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, fl
             yield f"{before}{key}", float(value)
 
 
-def _modes(case: Case, analysis: ModesAnalysis, result: Result | None) -> Outcome:
+def _modes(case: "Case", analysis: ModesAnalysis, result: Result | None) -> Outcome:
     """Damping ratio and frequency of the least damped oscillation from 0.3 to 40 Hz."""
     from railsim.linear.modes import modes
 
@@ -147,7 +149,9 @@ def _modes(case: Case, analysis: ModesAnalysis, result: Result | None) -> Outcom
     return {"damping": least.damping_ratio, "frequency": least.frequency}, found.remarks
 
 
-def _critical_speed(case: Case, analysis: CriticalSpeedAnalysis, result: Result | None) -> Outcome:
+def _critical_speed(
+    case: "Case", analysis: CriticalSpeedAnalysis, result: Result | None
+) -> Outcome:
     """Critical speeds by method; an end of the search where it hunts at no speed, or at all."""
     from railsim.stability.critical_speed import critical_speed
 
@@ -174,7 +178,7 @@ def _contact(analysis: ModesAnalysis | CriticalSpeedAnalysis) -> dict[str, Any]:
     return {name: getattr(analysis, name) for name in ("linearisation", "amplitude", "conicity")}
 
 
-def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Outcome:
+def _curving(case: "Case", analysis: CurvingAnalysis, result: Result | None) -> Outcome:
     """Largest magnitudes over the wheels or wheelsets, and the sum of the wear numbers."""
     import numpy as np
 

@@ -40,13 +40,12 @@ from railsim.result.extremes import BY_SIGN, FACTS, PEAK_QUANTITIES
 from railsim.studies.analyses import check_analyses, numbers_of
 from railsim.studies.case import Case, Loader, Overrides, run_labels, run_name
 from railsim.studies.rows import PERMITTED, Row, made_rows
-from railsim.studies.spec import RunSpec, StudySpec
+from railsim.studies.spec import MOST_RUNS, RunSpec, StudySpec
 from railsim.studies.user_function import fingerprint
 from railsim.units import ALLOWED, duration_in_words
 from railsim.version import __version__
 
 LONGEST_NAME = 250  # bytes of a file name with its ending; file systems allow 255
-MOST_RUNS = 200_000
 BETWEEN = 0.618  # share of a range, at no whole number of a usual one
 ROUGH_DURATION = 60.0  # s; simulated time of a run that has not been looked at
 # what a run takes at a rough guess: simulated seconds per second of one core, and seconds besides

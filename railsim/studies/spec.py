@@ -24,6 +24,7 @@ from railsim.version import __version__
 
 M = TypeVar("M", bound=BaseModel)
 MOST_FAULTS = 20
+MOST_RUNS = 200_000
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO, Literal
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -23,14 +23,15 @@ from railsim.notation import QUANTITIES
 from railsim.result import Result
 from railsim.result.extremes import FACTS, run_facts
 from railsim.studies.analyses import analysed
-from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, NOT_DONE, Records
-from railsim.studies.plan import MOST_RUNS
 from railsim.studies.records import Record, json_bytes, parsed
-from railsim.studies.spec import StudySpec, checked
+from railsim.studies.spec import MOST_RUNS, StudySpec, checked
 from railsim.studies.user_function import user_quantities
 from railsim.text import spreadsheet_cell
 from railsim.units import number_with_unit
+
+if TYPE_CHECKING:  # whose module brings the compiler along, which readers of a summary do without
+    from railsim.studies.case import Case
 
 Row = dict[str, Any]  # cells by the names of their columns, without units
 INDEX_BYTES = 500_000_000
@@ -43,14 +44,14 @@ _COLUMN = re.compile(r"(\w+?)_(?:peak|max|min|mid\d*|median\d*)(?:_(time|distanc
 FORMAT = "railsim-study-result/1"
 
 
-def waiting_record(case: Case) -> Record:
+def waiting_record(case: "Case") -> Record:
     """Return the record of a run that has not been done yet."""
     about = {"name": case.name, "file": case.file_name, "labels": dict(case.labels)}
     return {**about, "inputs_hash": case.key, "status": "waiting", "status_reason": ""}
 
 
 def finished_record(
-    case: Case, result: Result, function: str | None = None, known: Record | None = None
+    case: "Case", result: Result, function: str | None = None, known: Record | None = None
 ) -> Record:
     """Return the record of a run with its own quantities and analyses; RailsimError: one fails.
 
@@ -64,7 +65,7 @@ def finished_record(
     return {**facts, "quantities": found} if function or case.analyses else facts
 
 
-def failed_record(case: Case, error: Exception | str) -> Record:
+def failed_record(case: "Case", error: Exception | str) -> Record:
     """Return the record of a run without a result, with what the system refused, if anything."""
     facts: Record = {"status": "failed", "status_reason": str(error), "traceback": ""}
     if isinstance(error, OSError | MemoryError):

@@ -33,6 +33,7 @@ RUN = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "5"]
             ),
             (NOTHING_COMPILED, ["list"]),
             (NOTHING_COMPILED, ["info", "curve_r250"]),
+            (NOTHING_COMPILED, ["compare", "result.h5", "other.h5"]),
         ],
         [
             (NOTHING_COMPILED, ["info", "result.h5"]),
@@ -50,6 +51,7 @@ RUN = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "5"]
 )
 def test_commands_import_nothing_that_they_do_not_use(commands, tmp_path):
     """Given one after the other, those first that need the least."""
-    example_result.example_result().to_hdf5(tmp_path / "result.h5")
+    for name in ("result.h5", "other.h5"):
+        example_result.example_result().to_hdf5(tmp_path / name)
     command = [sys.executable, "-c", PROBE, json.dumps(commands)]
     subprocess.run(command, cwd=tmp_path, check=True)
