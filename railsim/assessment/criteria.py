@@ -13,6 +13,7 @@ percentiles of a signed quantity are values.  A window of 2 m lies within its se
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,10 +21,12 @@ from railsim.arrays import Floats
 from railsim.assessment import signals as of
 from railsim.assessment.sections import TestSection
 from railsim.assessment.signals import Band, Signal, Signals
-from railsim.contact.geometry import ContactGeometry
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.result.filters import distance_means, window_centres
 from railsim.table import beside
+
+if TYPE_CHECKING:
+    from railsim.contact.geometry import ContactGeometry
 
 SAFETY, LOADING, RIDE, INFORMATION = "safety", "loading", "ride", "information"
 VERDICTS = (SAFETY, LOADING, RIDE)
@@ -165,7 +168,7 @@ def steering(signals: Signals, section: TestSection) -> Values:
     return {} if math.isnan(index) else {"wheelset 1": [index]}
 
 
-def steering_index(geometry: ContactGeometry, radius: float, rolling_radius: float) -> float:
+def steering_index(geometry: "ContactGeometry", radius: float, rolling_radius: float) -> float:
     """Radius difference for rolling without creep, over that before the flange; nan if unknown [1].
 
     e r0/R with the distance e of the contact points (Redtenbacher 1855), over the largest one that

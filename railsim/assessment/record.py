@@ -7,11 +7,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle.bogies import bogie_name
 from railsim.definitions.vehicle.flatten import flatten
@@ -19,6 +19,9 @@ from railsim.errors import Fault, InputError
 from railsim.result import Result
 from railsim.result.sensors import Sensor, readings, sensors
 from railsim.track.alignment import Alignment
+
+if TYPE_CHECKING:
+    from railsim.contact.geometry import ContactGeometry
 
 FINE_ENOUGH = 1000.0  # samples per second of instantaneous values
 WIDE_ENOUGH = 40.0  # Hz, low pass of a run: twice the corner of the filters of EN 14363 and UIC 518
@@ -142,12 +145,15 @@ class Record:
         return Alignment(self.result.track())
 
     @cached_property
-    def geometry(self) -> ContactGeometry | None:
+    def geometry(self) -> "ContactGeometry | None":
         """Contact functions of the leading wheelset, rigid rails; None: profiles do not fit."""
         return self.geometry_with(0.0)
 
-    def geometry_with(self, widening: float) -> ContactGeometry | None:
+    def geometry_with(self, widening: float) -> "ContactGeometry | None":
         """As `geometry`, where the gauge is wider [m]."""
+        # with the compiler, which most standards do without
+        from railsim.contact.geometry import geometry_of
+
         wheelset = flatten(self.result.vehicle()).of_kind("wheelset")[0].wheelset
         track, known = self.result.track(), self.result.profiles
         if wheelset is None or not {*wheelset.profile, *track.rail} <= known.keys():

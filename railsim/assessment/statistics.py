@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import stdtrit
 
 from railsim.arrays import Floats
 
@@ -87,6 +86,8 @@ def two_dimensional(x: Floats, y: Floats, x0: float, probability: float) -> Esti
     error = float(np.sqrt(np.sum((y - level - slope * x) ** 2) / (n - 2)))
     middle = float(np.mean(x))
     squares = float(np.sum((x - middle) ** 2))
+    from scipy.special import stdtrit  # long to import
+
     t = float(stdtrit(n - 2, probability))  # quantile of Student's t
     line = Line(float(level), float(slope), error, x0, t, n, middle, squares)
     return replace(plain, value=float(line.bound(x0)), method="two", line=line)

@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from railsim.arrays import Floats
 from railsim.errors import ModelError
@@ -97,6 +96,8 @@ def _orbit_centre(y: Floats, delta_r: Floats, potential: Floats, amplitude: floa
     if rising.size == 0:
         flat = np.flatnonzero(np.abs(values) <= 1e-9 * scale)
         return float(grid[flat[np.argmin(np.abs(grid[flat]))]]) if flat.size else None
+    from scipy.optimize import brentq  # long to import, and few commands need it
+
     i = int(rising[np.argmin(np.abs(grid[rising]))])
     return float(brentq(excess, grid[i], grid[i + 1], xtol=1e-15))
 

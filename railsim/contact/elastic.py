@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from railsim.arrays import Floats
 from railsim.contact.coupling import coupling
@@ -115,6 +114,8 @@ def loaded_contact(table: ContactTable, y: float, roll: float, load: float) -> L
         depth *= 2.0
         if depth > 1.0:
             raise ModelError(f"the load of {load:g} N is not reached")
+    from scipy.optimize import brentq  # long to import
+
     z = float(brentq(lambda z: vertical(z).sum() - load, lowest, lowest + depth, xtol=1e-12))
     patches = []
     for patch, (N_z, e) in enumerate(zip(vertical(z), approaches(z), strict=True)):

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eig, eigvals
-from scipy.optimize import brentq, linear_sum_assignment, minimize_scalar
 
 from railsim.arrays import Complexes, Floats, Indices
 from railsim.linear.system import Linearisation
@@ -139,6 +138,8 @@ def _partners(
     apart = np.abs(one - other) / (np.abs(one) + np.abs(other))
     # of modes with nearly the same eigenvalue any mixture is a mode: the nearer value decides
     scores = shared - apart
+    from scipy.optimize import linear_sum_assignment  # long to import, as below
+
     rows, columns = linear_sum_assignment(-scores)
     pairs = {
         int(i): int(j)
@@ -234,6 +235,8 @@ def loss_of_stability(
             unstable = _beyond_zero(growth, passed, half, after, high)
         if unstable is not None:
             stable = passed if unstable > passed else before
+            from scipy.optimize import brentq
+
             root = float(brentq(growth, stable, unstable, xtol=1e-7 * high, rtol=1e-12))
             return LossOfStability(root, False, (modes(root),))
         before, passed = passed, after
@@ -260,6 +263,8 @@ def _beyond_zero(
         looked |= growth(end) + 100.0 * (growth(inside) - growth(end)) >= 0.0
     if not looked:
         return None
+    from scipy.optimize import minimize_scalar
+
     found = minimize_scalar(
         lambda x: -growth(x), bounds=(before, after), method="bounded", options={"maxiter": 12}
     )
