@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic_core import to_json
 
 from railsim.arrays import Floats
 from railsim.errors import (
@@ -182,11 +183,14 @@ def _columns(result: Result, quantities: Sequence[str] = ()) -> Columns:
 
 def _csv(found: Columns, path: Path) -> None:
     table = np.stack([values for _, _, values in found], axis=1)
+    head = [name if unit == "1" else f"{name} ({unit})" for name, unit, _ in found]
     with open(path, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([name if unit == "1" else f"{name} ({unit})" for name, unit, _ in found])
+        csv.writer(file, lineterminator="\n").writerow(head)
         for begin in range(0, len(table), ROWS_AT_ONCE):
-            writer.writerows(table[begin : begin + ROWS_AT_ONCE].tolist())
+            # the shortest digits that give the number back, as `repr`, in a tenth of its time
+            rows = to_json(table[begin : begin + ROWS_AT_ONCE].tolist(), inf_nan_mode="constants")
+            lines = rows.decode()[2:-2].replace("],[", "\n").replace("NaN", "nan")
+            file.write(f"{lines}\n")
 
 
 def _matlab(result: Result, path: Path) -> None:
