@@ -253,16 +253,20 @@ class Stability:
         return self._on_straight(margin * h, lambda: self._within(0, *self._straight, h, margin))
 
     def holds(self, h: float, margin: float = 1.0) -> bool:
-        """Whether a step `margin` times as long as `h` is stable, in flange contact too."""
-        if not self.holds_on_straight(h, margin):
-            return False
-        if self._flange is None:
+        """Whether a step `margin` times as long as `h` is stable, in flange contact too.
+
+        The way into the curve needs a step that is stable on straight track; shorter ones are
+        judged in the curve first, where most of those fail that do.
+        """
+        if first := self._flange is None:
+            if not self.holds_on_straight(h, margin):
+                return False
             self._flange = self._curving(min(h, self.longest))
         margins = margin, math.sqrt(margin)
         return all(
             self._within(number, *at, h, factor)
             for number, (at, factor) in enumerate(zip(self._flange, margins, strict=False), 1)
-        )
+        ) and (first or self.holds_on_straight(h, margin))
 
     def _within(
         self, number: int, system: System, state: Floats, h: float, margin: float = 1.0

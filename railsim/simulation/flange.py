@@ -35,6 +35,9 @@ WIDEST = 1500.0  # m; in wider curves wheelsets run on their treads
 TIMES = 3.0, 3.0  # in transition and curve, at least, where the vehicle settles [s]
 # the same before Newton's method, and lengths [m]: the last wheelset has to be well in the curve
 SHORT, SHORT_LENGTHS = (0.5, 0.0), (20.0, 10.0)
+# m/s, no slower on the way to Newton's method, which ends at the speed in question: where speeds
+# are low the state of rest hardly depends on them, and the time of the way goes with 1/V
+BEGIN = 2.0
 # The state sought is one of rest and does not depend on the contact damping: with more of it, it is
 # reached also where the wheelset would vibrate.
 MORE_DAMPING = 4.0
@@ -73,7 +76,9 @@ def in_flange_contact(
         return None
     DOING.info("settling in flange contact, for judging the time step")
     if not (model.system.internal.kind == PAD).any():
-        found = _brought(model, track, curve, rolling, step, progress, SHORT, SHORT_LENGTHS)
+        start = rolling.copy()
+        start[SPEED] = max(start[SPEED], BEGIN)
+        found = _brought(model, track, curve, start, step, progress, SHORT, SHORT_LENGTHS)
         with suppress(NotConverged):
             if found is not None:
                 return found[0], _at_rest(model, *found, rolling)

@@ -138,7 +138,7 @@ class StepChoice:
             nonlocal by_class
             if by_class and self._in_class(speed, step):
                 return True
-            if self._fails_in_class(speed, step):
+            if by_class and self._fails_in_class(speed, step):
                 return False
             by_class = False  # its ends do not tell, for shorter steps neither
             return own.holds(step, own.margin)
