@@ -12,7 +12,7 @@ from railsim.definitions.mirror import mirrored_track
 from railsim.definitions.settings import Settings
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rhs import right_hand_side
-from railsim.kernels.state import velocity_begin
+from railsim.kernels.state import SPEED, velocity_begin
 from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model import time_step
 from railsim.model.assembly import assemble
@@ -81,6 +81,19 @@ def test_growth_does_not_depend_on_the_step_of_the_way():
     ]
     assert growths[0] > 10.0
     assert growths[0] == pytest.approx(growths[1], rel=0.02)
+
+
+def test_state_of_rest_at_low_speed_does_not_depend_on_the_speed_of_the_way(ways, monkeypatch):
+    """Wheel forces at 1 m/s within 1e-6 of the load, from a way at 2 m/s and from one at 1 m/s."""
+    track = railsim.load_track("curve_r250")
+    model, state, load = rolling("coach_manchester", track, 1.0)
+    found = flange.in_flange_contact(model, track, state, 2.0 * STEP)
+    monkeypatch.setattr(flange, "BEGIN", 0.0)
+    other = flange.in_flange_contact(model, track, state, 2.0 * STEP)
+    assert [at[1][SPEED] for at in (found, other)] == [1.0, 1.0]
+    assert len(ways) == 2
+    forces = [wheel_forces(*at) / load for at in (found, other)]
+    assert forces[0] == pytest.approx(forces[1], abs=1e-6)
 
 
 def test_one_short_way_is_enough_without_friction_elements(ways):
