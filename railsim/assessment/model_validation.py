@@ -222,7 +222,7 @@ class _Run:
     channels: list[_Channel]
     remarks: list[str]
     resting: dict[str, set[float]] = field(default_factory=dict)  # channels: begins of sections
-    lacking: set[str] = field(default_factory=set)  # quantities that these sections give no value of
+    lacking: set[str] = field(default_factory=set)  # quantities that they give no value of
 
     @classmethod
     def of(cls, run: Measurement, result: Result) -> "_Run":

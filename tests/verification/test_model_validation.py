@@ -245,7 +245,7 @@ def test_quantity_whose_only_channels_rest_is_incomplete(measured, right):
     found = railsim.validate_model(spoilt(measured, Q1L=dead, Q1R=dead), right)
     assert (found["Q_qst"].sections, found["Q_qst"].verdict) == (0, "incomplete")
     assert found.verdict == "incomplete"
-    assert len(plots.scatter(found).axes) == len(found.comparisons) - 4  # without those of Q, Y over Q
+    assert len(plots.scatter(found).axes) == len(found.comparisons) - 4  # Q, Y over Q
 
 
 def test_the_load_of_the_other_side_is_no_more_called_reversed_only(measured, right):
