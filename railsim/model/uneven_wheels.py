@@ -22,6 +22,7 @@ from railsim.model.rail_ranges import RailRanges
 from railsim.profiles.profile import Profile
 
 PER_LENGTH = 20.0  # steps over a flat or wave
+PER_WAVE = 60.0  # on rigid rails, where the fast scheme smooths the accelerations of wheelsets
 
 
 class UnevenWheels(NamedTuple):
@@ -48,9 +49,10 @@ class UnevenWheels(NamedTuple):
                 found[side] = [np.interp(angle, nodes, x, period=turn) for x in values.T]
         return found
 
-    def longest_step(self, speed: float) -> float:
-        """Longest step that resolves the waves around the wheels [s]."""
-        return float(min(self.surface_row[:, WAVE], default=np.inf)) / (PER_LENGTH * speed)
+    def longest_step(self, speed: float, *, elastic: bool) -> float:
+        """Longest step that resolves the waves around the wheels, on elastic or rigid rails [s]."""
+        steps = PER_LENGTH if elastic else PER_WAVE
+        return float(min(self.surface_row[:, WAVE], default=np.inf)) / (steps * speed)
 
 
 ROUND = UnevenWheels(

@@ -101,7 +101,9 @@ class StepChoice:
         longest = self._known.get(key) or self._choose(key, interval)
         self._known[key] = longest
         if self._settings.step is None:
-            longest = min(longest, self._model.wheels.longest_step(speed), self._followed)
+            elastic = bool(self._model.system.support.elastic)
+            waves = self._model.wheels.longest_step(speed, elastic=elastic)
+            longest = min(longest, waves, self._followed)
         longest = min(longest, *self._periods, longest)
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
         for finer in range(every, 2 * every + 1) if self._periods else ():
