@@ -382,18 +382,15 @@ class Output:
             return
         access.make_folder(self.folder)
         path = self.folder / name
-        content = content() if callable(content) else content
-        if hasattr(content, "savefig"):
-            from railsim.plot.style import save
-
-            save(content, path, overwrite=True)
-        else:
-            with access.whole_file(path) as partial:
-                partial.write_bytes(_bytes(content))
+        with access.whole_file(path) as partial:
+            partial.write_bytes(_bytes(content))
         self.written.append(path)
 
     def write_all(self, content: Mapping[str, Any]) -> None:
-        """Write files into the folder, all of them or none; contents as of `write`."""
+        """Write files into the folder, all of them or none; contents as of `write`.
+
+        One alone would refuse the same command, which is to go on after an interruption.
+        """
         if self.folder is not None:
             data = {name: _bytes(one) for name, one in content.items()}
             self.written += access.write_folder(self.folder, data, overwrite=self.overwrite)
@@ -416,8 +413,7 @@ class Output:
         record = found.record()
         for one in record if isinstance(record, list) else [record]:
             one |= more
-        self.write(names[0], record)
-        self.write(names[1], found.plot)
+        self.write_all({names[0]: record, names[1]: found.plot})
         self.answer(record, parts, remarks)
 
     def progress(self, words: str) -> AbstractContextManager[Callable[[float], None]]:
@@ -444,8 +440,13 @@ class Output:
 def _bytes(content: Any) -> bytes:
     from railsim.table import Table
 
+    content = content() if callable(content) else content
     if isinstance(content, bytes):
         return content
+    if hasattr(content, "savefig"):
+        from railsim.plot.style import drawn
+
+        return drawn(content)
     if isinstance(content, Table):
         content = content.csv()
     elif not isinstance(content, str):

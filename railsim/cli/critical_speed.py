@@ -1,5 +1,6 @@
 """``railsim critical-speed``: linear and non-linear critical speed of a vehicle."""
 
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -100,8 +101,8 @@ def _map(
     shown = {f"{name} ({units[name]})" if units[name] else name: axes[name] for name in axes}
     table = map_table(found, units)
     title = f"{points[0].vehicle.name_with_load}: critical speed\n{table.caption}"
-    output.write(FILES[0], found)
-    output.write(FILES[1], lambda: map_figure(shown, map_speeds(found), title))
+    figure = partial(map_figure, shown, map_speeds(found), title)
+    output.write_all({FILES[0]: found, FILES[1]: figure})
     remarks = dict.fromkeys(remark for record in found for remark in record["remarks"])
     output.answer(found, [table], remarks)
 

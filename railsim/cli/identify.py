@@ -68,9 +68,8 @@ def command(
         part = report.of_identification(found.record(), report.drawn(figures))
         pictures = figures["fits"], figures["residuals"]
         content = found.record(), report.measured_page([part]), *pictures
+        output.write_all(dict(zip(FILES[1:], content, strict=True)))
         output.written.append(found.save_vehicle(folder / FILES[0], vehicle, overwrite=True))
-        for name, one in zip(FILES[1:], content, strict=True):
-            output.write(name, one)
         shutil.rmtree(folder / KEPT, ignore_errors=True)
     tables = (found.table(), found.correlation_table(), found.residual_table())
     parts = [part for table in tables for part in ("", table)]

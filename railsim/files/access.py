@@ -16,7 +16,7 @@ import stat
 import tempfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import chain, count
 from pathlib import Path
 from typing import BinaryIO, Self
@@ -104,13 +104,14 @@ def write_folder(
 ) -> list[Path]:
     """Write files by their names into a folder, created if it does not exist; their paths.
 
-    Raises InputError: one of them exists and may not be overwritten; nothing is written then.
+    None gets its name before all are written: on a full disk there is none of them.  Raises
+    InputError: one of them exists and may not be overwritten; nothing is written then.
     """
     check_folder(folder, content, overwrite=overwrite)
     make_folder(folder)
-    for name, data in content.items():
-        with whole_file(folder / name) as partial:
-            partial.write_bytes(data)
+    with ExitStack() as all_whole:
+        for name, data in content.items():
+            all_whole.enter_context(whole_file(folder / name)).write_bytes(data)
     return [folder / name for name in content]
 
 

@@ -85,9 +85,7 @@ class Picture(Figure):
             self.suptitle("\n".join(lines), x=0.012, ha="left")
 
     def _repr_png_(self) -> bytes:
-        stream = BytesIO()
-        self.savefig(stream, format="png")
-        return stream.getvalue()
+        return drawn(self)
 
 
 def single(
@@ -235,9 +233,16 @@ def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=PICTURES)
+    with whole_file(path) as partial:
+        partial.write_bytes(drawn(figure, path.suffix[1:].lower()))
+    return path
+
+
+def drawn(figure: Figure, form: str = "png") -> bytes:
+    """Return the file of a figure in a format of matplotlib's."""
+    stream = BytesIO()
     with warnings.catch_warnings():
         # letters that the font lacks are drawn as boxes, and that is seen
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        with whole_file(path) as partial:
-            figure.savefig(partial, format=path.suffix[1:].lower())
-    return path
+        figure.savefig(stream, format=form)
+    return stream.getvalue()

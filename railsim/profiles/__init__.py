@@ -21,7 +21,7 @@ from railsim.profiles.builtin import DEFINITIONS, builtin_profile
 from railsim.profiles.profile import Kind, Profile
 from railsim.text import LONGEST_FILE, shortened
 
-__all__ = ["Profile", "load_profile", "save_profile"]
+__all__ = ["Profile", "load_profile", "profile_text", "save_profile"]
 
 
 def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
@@ -75,11 +75,16 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
 
 
 def save_profile(profile: Profile, path: Path) -> Path:
-    """Write a profile as a CSV file that can stand in a vehicle or track file; return its path.
+    """Write the file of `profile_text`; return its path.
 
     Raises InputError: the file cannot be written.
     """
+    write_text(path, profile_text(profile))
+    return path
+
+
+def profile_text(profile: Profile) -> str:
+    """Return a profile as text of a CSV file that can stand in a vehicle or track file."""
     lines = [f"# {profile.name}", *(f"# {json.dumps(note)}" for note in profile.notes), "y_mm,z_mm"]
     lines += [f"{1e3 * y:.6f},{1e3 * z:.6f}" for y, z in zip(profile.y, profile.z, strict=True)]
-    write_text(path, "\n".join(lines) + "\n")
-    return path
+    return "\n".join(lines) + "\n"

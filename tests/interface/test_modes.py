@@ -176,7 +176,7 @@ def test_cant_of_a_left_hand_curve_is_negative(capsys, cant, told):
 def undrawn():
     """Without the picture beside an animation."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("railsim.plot.style.save", lambda *_, **__: None)
+        patch.setattr("railsim.plot.style.drawn", lambda _: b"")
         yield
 
 

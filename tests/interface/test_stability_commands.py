@@ -87,6 +87,22 @@ def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path, undra
     assert [path.stat().st_mtime_ns for path in kept] == before  # not computed again
 
 
+def test_map_that_is_interrupted_while_it_is_drawn_goes_on(tmp_path, monkeypatch, undrawn):
+    """Its points are kept; a record alone would refuse the command, `--overwrite` begin anew."""
+    folder = tmp_path / "map"
+    command = map_command(folder)
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("railsim.plot.stability.map_figure", interrupted)
+        assert main(command) == 130
+    assert [path.name for path in folder.iterdir()] == ["points"]
+    with undrawn():
+        assert main(command) == 0
+
+
 def test_damaged_point_of_a_map_is_computed_again_and_told(capsys, tmp_path):
     folder = tmp_path / "map"
     command = map_command(folder)

@@ -187,7 +187,7 @@ def test_command_draws_the_wear_of_both_rails(tmp_path, monkeypatch):
 
     monkeypatch.setattr("railsim.studies.rail_wear.rail_wear", steps)
     figures = []
-    monkeypatch.setattr("railsim.plot.style.save", lambda figure, *_, **__: figures.append(figure))
+    monkeypatch.setattr("railsim.plot.style.drawn", lambda figure: figures.append(figure) or b"")
     given = ["--traffic", "coach_manchester", "20", "1", "--tonnage", "0.2", "--step", "0.1"]
     assert main(["rail-wear", "curve_r500", *given, "--out", str(tmp_path / "w")]) == 0
     (figure,) = figures
@@ -204,6 +204,30 @@ def test_command_draws_the_wear_of_both_rails(tmp_path, monkeypatch):
     assert main(["report", str(tmp_path / "w"), "--out", str(page)]) == 0
     for words in ("wear of the rails", "left rail", "right rail", "0.200", "0.050"):
         assert words in page.read_text()
+
+
+def test_wear_that_is_interrupted_while_it_is_drawn_goes_on(tmp_path, monkeypatch):
+    """The steps are kept; a record or a profile alone would refuse the command."""
+    both = dict.fromkeys(("left", "right"), load_profile("60E1"))
+
+    def steps(*_, on_step, step, **__):
+        on_step(WearStep(0.0, step, both, both, {}))
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("railsim.studies.rail_wear.rail_wear", steps)
+    monkeypatch.setattr("railsim.plot.style.drawn", lambda _: b"")
+    folder = tmp_path / "worn"
+    given = ["--traffic", "coach_manchester", "20", "1", "--tonnage", "0.1", "--step", "0.1"]
+    command = ["rail-wear", "curve_r500", *given, "--out", str(folder)]
+    with monkeypatch.context() as patch:
+        patch.setattr("railsim.plot.study.rail_wear_figure", interrupted)
+        assert main(command) == 130
+    assert not folder.exists()
+    assert main(command) == 0
+    files = {"wear.json", "wear.png", "left_0.1_Mt.csv", "right_0.1_Mt.csv"}
+    assert {path.name for path in folder.iterdir()} == files
 
 
 @pytest.mark.parametrize(("deepest", "place"), [(4e-8, ""), (6e-8, "-2.5")])

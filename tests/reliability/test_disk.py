@@ -14,7 +14,7 @@ from selection import points
 
 from railsim.cli import main
 from railsim.errors import InputError
-from railsim.files.access import PartialFile, sweep, whole_file
+from railsim.files.access import PartialFile, sweep, whole_file, write_folder
 from railsim.result import check_result
 from railsim.studies.journal import Journal
 
@@ -97,6 +97,19 @@ def test_full_disk_is_one_line(small_disk, tmp_path, capsys, command, room):
         assert f"No space left on device: {small_disk}{os.sep}" in error
     left = [path.name for path in small_disk.rglob("*") if path.is_file()]
     assert not [name for name in left if name.endswith(".partial")]
+
+
+def test_files_that_belong_together_are_all_there_or_none(small_disk):
+    """One alone would refuse the same command once there is room."""
+    leave(small_disk, 32 * KB)
+    folder = small_disk / "out"
+    content = {"a.json": bytes(8 * KB), "b.png": bytes(64 * KB)}
+    with pytest.raises(OSError, match="No space left on device") as error:
+        write_folder(folder, content)
+    assert error.value.filename == str(folder / "b.png")
+    assert os.listdir(folder) == []
+    leave(small_disk, 128 * KB)
+    assert write_folder(folder, content) == [folder / "a.json", folder / "b.png"]
 
 
 def fill(journal, record):
