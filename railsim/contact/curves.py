@@ -217,14 +217,18 @@ def contour_curve(y: Floats, z: Floats) -> RailCurve:
     part = single_valued_part(y, z, int(np.argmin(z)), STEEPEST)
     spline = contour_spline(y[part], z[part])
     n = int((y[part.stop - 1] - y[part.start]) / RAIL_SPACING)
-    nodes = y[part.start] + RAIL_SPACING * np.arange(n + 1)
-    slope = spline(nodes, 1)
-    # what lies beyond the ends continues them straight, and never upwards
+    cut = part.start > 0, part.stop < y.size
+    nodes = y[part.start] + RAIL_SPACING * np.arange(-cut[0], n + 1 + cut[1])
+    inside = np.clip(nodes, y[part.start], y[part.start] + RAIL_SPACING * n)
+    beyond = nodes - inside
+    slope = np.where(beyond == 0.0, spline(inside, 1), np.copysign(STEEPEST, beyond))
+    # beyond the ends the rail goes on straight: where the points go on more steeply, at the
+    # steepest slope that is searched; where they end, as they do, and never upwards
     slope[0], slope[-1] = min(float(slope[0]), 0.0), max(float(slope[-1]), 0.0)
     return RailCurve(
         Y0=float(nodes[0]),
         dY=RAIL_SPACING,
-        z=spline(nodes),
+        z=spline(inside) + STEEPEST * np.abs(beyond),
         slope=slope,
         curvature=averaged_curvature(nodes, slope, 1.0),
     )

@@ -1,5 +1,7 @@
 """Rigid contact geometry against an independent search, and the landmarks of known pairs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from independent_contact import lowest_gap, rail_points
@@ -162,6 +164,18 @@ def test_wider_gauge_moves_the_flange_contact_outwards():
 def test_gauge_that_does_not_fit_is_refused(gauge, words):
     with pytest.raises(InputError, match=words):
         contact_geometry(load_profile("S1002"), load_profile("60E1"), gauge=gauge)
+
+
+def test_flange_touches_the_edge_of_a_rail_cut_vertically():
+    """The innermost point of a rail with a vertical face is the edge, at half the gauge."""
+    rail = load_profile("60E1")
+    cut = replace(rail, y=np.maximum(rail.y, -0.030))
+    found = contact_geometry(
+        load_profile("S1002"), cut, inclination=0.0, lateral=[-0.008, -0.005, 0.005, 0.008]
+    )
+    at_flange = found.wheel_y < -0.035
+    assert at_flange.tolist() == [[True, False], [True, False], [False, True], [False, True]]
+    np.testing.assert_allclose(np.abs(found.contact_y[at_flange]), 0.7175, atol=5e-5)
 
 
 @pytest.mark.parametrize("start", [3, 4, 5, 6])
