@@ -10,25 +10,48 @@ seen from the rail, within its first half and round (the contour turns back behi
 of a rail: a crown from which the contour only falls, 14 mm or more on the gauge side.
 """
 
+from typing import Any
+
 import numpy as np
 
 from railsim.arrays import Floats
 from railsim.profiles.profile import FLANGE_BACK, Kind, Profile
 from railsim.profiles.readers import Points
-from railsim.profiles.smoothing import smoothed_points, used_part
+from railsim.profiles.smoothing import departures, smoothed_points, used_part
 
 FEWEST_POINTS = 20
 LARGEST_HOLE = 0.006
 """Largest distance of neighbouring points [m]: across it a curve of 13 mm radius departs by
 0.35 mm from its chord, which cubic interpolation still brings down to some 5 um."""
 
+NEAREST = 5e-6
+"""Distance below which a point that is far nearer than usual repeats the one before [m]."""
+
 STEP = 0.3e-3
 """Smallest vertical step that is not taken for a steep slope [m]."""
+
+SMALLEST_OUTLIER = 15e-6
+"""Departure from the neighbours, over that of noise, below which no point is an outlier [m]."""
+
+MOST_TRIED, WIDEST = 10, 4e-3
+"""Number of departing points of which one may be an outlier; its four neighbours' width [m]."""
 
 FLANGE_HEIGHTS = (0.015, 0.050)
 TREAD_WIDTH = 0.030
 GAUGE_SIDE_DEPTH = 0.0140
 STANDARD_INCLINATIONS = (1 / 20, 1 / 30, 1 / 40)
+HIGHEST_FACE, DEEPEST_FACE = 1.5e-3, 10e-3
+"""Depths below its top between which a rail that is steeper than 80 degrees is worn [m]."""
+
+STEEP_FLANK = 0.075
+"""Slope to the vertical of an unworn head's flanks at most [1]; 1:17.2 of 49E1 is 0.058."""
+
+LARGEST_SKEW = 0.5e-3
+"""Shift of a head's upper part from the middle of its flanks beyond which it is worn [m]."""
+
+BACK_TOLERANCE = 0.5e-3
+"""Distance of a measured flange back from -70 mm up to which the origin is left alone [m]."""
+
 UPRIGHT = 4e-3
 """Lean that measuring noise and wear may feign [1]."""
 
@@ -64,6 +87,8 @@ def recognised_profile(work: Points, kind: Kind | None = None) -> Profile:
     y, z = smoothed_points(work)
     _check_overhang(work, kind, y, z)
     level = float(np.interp(0.0, *_function_part(y, z)) if kind == "wheel" else z.min())
+    if kind == "wheel" and abs(level) > 1e-5:
+        work.notes.append(f"z moved by {-1e3 * level:.3f} mm: zero at the nominal rolling circle")
     smoothed = y is not work.y
     return Profile(
         work.name,
@@ -116,7 +141,11 @@ def _distances(work: Points) -> Floats:
 
 
 def _remove_double_points(work: Points) -> None:
-    double = np.concatenate(([False], _distances(work) < 1e-9))
+    distances = _distances(work)
+    apart = distances[distances > 1e-9]
+    # the rounding of numbers makes any slope between points that nearly coincide
+    nearest = max(1e-9, min(NEAREST, 0.1 * float(np.median(apart)))) if apart.size else 1e-9
+    double = np.concatenate(([False], distances < nearest))
     if double.any():
         work.notes.append(f"{int(double.sum())} double points left out")
         work.keep(~double)
@@ -141,29 +170,58 @@ def _bring_into_order(work: Points) -> None:
 
 
 def _remove_outliers(work: Points) -> None:
-    """Leave out single points that stand off the line through their neighbours."""
+    """Leave out single points that stand off the contour through their neighbours."""
     removed: list[int] = []
-    for _ in range(max(work.y.size // 50, 1) + 1):
-        y, z = work.y, work.z
-        chord = np.hypot(y[2:] - y[:-2], z[2:] - z[:-2])
-        area = np.abs((y[2:] - y[:-2]) * (z[1:-1] - z[:-2]) - (z[2:] - z[:-2]) * (y[1:-1] - y[:-2]))
-        height = area / np.maximum(chord, 1e-9)
-        usual = np.median(height) + 1e-6
-        spike = (height > STEP) & (height > 30.0 * usual) & (height > 0.6 * chord)
-        # an outlier stands off more than its neighbours do
-        padded = np.concatenate(([0.0], height, [0.0]))
-        spike &= (height >= padded[:-2]) & (height >= padded[2:])
-        if not spike.any():
+    most = max(work.y.size // 50, 1)
+    for _ in range(most + 1):
+        at = _spike(work.y, work.z)
+        if at is None:
+            at = _small_outlier(work.y, work.z)
+        if at is None:
             break
-        at = int(np.argmax(np.where(spike, height, 0.0))) + 1
         removed.append(int(work.line[at]))
-        if len(removed) > max(work.y.size // 50, 1):
+        if len(removed) > most:
             found = f"{len(removed)} or more points stand off the contour, the last in this line"
             raise work.fail(found, "mend the measurement", at)
         work.keep(np.arange(work.y.size) != at)
     if removed:
         lines = ", ".join(str(line) for line in sorted(removed)[:8])
         work.notes.append(f"{len(removed)} outliers left out (line {lines})")
+
+
+def _spike(y: Floats, z: Floats) -> int | None:
+    """Index of the point that stands off the line through its neighbours most, if it is a spike."""
+    chord = np.hypot(y[2:] - y[:-2], z[2:] - z[:-2])
+    area = np.abs((y[2:] - y[:-2]) * (z[1:-1] - z[:-2]) - (z[2:] - z[:-2]) * (y[1:-1] - y[:-2]))
+    height = area / np.maximum(chord, 1e-9)
+    usual = np.median(height) + 1e-6
+    spike = (height > STEP) & (height > 30.0 * usual) & (height > 0.6 * chord)
+    # an outlier stands off more than its neighbours do
+    padded = np.concatenate(([0.0], height, [0.0]))
+    spike &= (height >= padded[:-2]) & (height >= padded[2:])
+    return int(np.argmax(np.where(spike, height, 0.0))) + 1 if spike.any() else None
+
+
+def _small_outlier(y: Floats, z: Floats) -> int | None:
+    """Index of a point that stands off the cubic through its neighbours far beyond the noise.
+
+    Without an outlier its neighbours fit each other, without a point of an edge they do not.
+    """
+
+    def off(part: Any) -> Floats:
+        s = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(y[part]), np.diff(z[part])))))
+        return np.hypot(departures(s, y[part]), departures(s, z[part]))
+
+    every = off(slice(None))
+    least = max(SMALLEST_OUTLIER, 20.0 * float(np.median(every)))
+    for at in np.argsort(every)[: -MOST_TRIED - 1 : -1] + 2:
+        if every[at - 2] < least:
+            break
+        around = np.arange(max(at - 6, 0), min(at + 7, y.size))
+        width = np.hypot(y[at + 2] - y[at - 2], z[at + 2] - z[at - 2])
+        if width < WIDEST and off(around[around != at]).max() < 0.2 * every[at - 2]:
+            return int(at)
+    return None
 
 
 def _check_holes(work: Points) -> None:
@@ -237,16 +295,15 @@ def _shift_wheel(work: Points) -> None:
     tip = int(np.argmax(work.z))
     before = work.y[: tip + 1]
     back = float(before.min())
-    slope_back = np.abs(np.diff(work.z[: tip + 1])) > 5.0 * np.abs(np.diff(before))
-    has_back = bool(slope_back.any()) and float(work.z[tip] - work.z[: tip + 1].min()) > 5e-3
+    has_back = _steep_back(before, work.z[: tip + 1])
     tip_y = float(work.y[tip])
-    if not -0.066 < tip_y < -0.045:
-        if not has_back:
-            raise work.fail(
-                f"the flange's tip lies at y = {1e3 * tip_y:.1f} mm and the flange back is missing",
-                "give y from the nominal rolling circle: flange back at -70 mm, tip near -55 mm",
-            )
-        shift = FLANGE_BACK - back
+    if not has_back and not -0.066 < tip_y < -0.045:
+        raise work.fail(
+            f"the flange's tip lies at y = {1e3 * tip_y:.1f} mm and the flange back is missing",
+            "give y from the nominal rolling circle: flange back at -70 mm, tip near -55 mm",
+        )
+    shift = FLANGE_BACK - back
+    if has_back and abs(shift) > BACK_TOLERANCE:
         work.y = work.y + shift
         work.notes.append(
             f"origin moved by {1e3 * shift:.2f} mm to the nominal rolling circle, "
@@ -257,11 +314,19 @@ def _shift_wheel(work: Points) -> None:
             f"covers y from {1e3 * work.y.min():.1f} to {1e3 * work.y.max():.1f} mm only",
             "the tread is needed from the flange to 20 mm outside of the nominal rolling circle",
         )
-    y, z = _function_part(work.y, work.z)
-    level = float(np.interp(0.0, y, z))
-    if abs(level) > 1e-5:
-        work.notes.append(f"z moved by {-1e3 * level:.3f} mm: zero at the nominal rolling circle")
-    work.z = work.z - level
+
+
+def _steep_back(y: Floats, z: Floats) -> bool:
+    """Whether the contour before the flange's tip reaches the flange back.
+
+    It does where it falls 5 mm behind the tip and is steeper than 1:7 to the vertical over 1 mm,
+    so that noise between close points does not feign it; the arc of 20.5 mm between the tip and
+    the back of EN 13715 is then 0.2 mm from the back.
+    """
+    s = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))))
+    even = np.arange(0.0, s[-1], 1e-3)
+    dy, dz = np.diff(np.interp(even, s, y)), np.diff(np.interp(even, s, z))
+    return bool((np.abs(dz) > 7.0 * np.abs(dy)).any() and z[-1] - z.min() > 5e-3)
 
 
 def _function_part(y: Floats, z: Floats) -> tuple[Floats, Floats]:
@@ -295,7 +360,7 @@ def _orient_rail(work: Points) -> float:
             raise work.fail(
                 f"not a rail profile: the contour rises again by {1e3 * back:.1f} mm beside the "
                 "crown, like a wheel's flange",
-                "a rail falls on both sides",
+                "a rail falls on both sides; cut a grooved rail at the bottom of its groove",
             )
     if max(widths) < 0.015:
         found = f"the crown is only {1e3 * max(widths):.1f} mm wide"
@@ -333,30 +398,50 @@ def _orient_rail(work: Points) -> float:
 
 
 def _flank_inclination(work: Points) -> float | None:
-    """Lean of the head's middle line between both flanks, gauge side positive [1]."""
+    """Lean of the head's middle line between both flanks, gauge side positive [1].
+
+    Side wear shifts the middle line too, and leans it by half of the worn face's slope. Where the
+    flanks together are less steep than unworn ones, or the turned head is not symmetric to the
+    line, the lean is not the rail's (unless it is a usual one between flanks of some 1:20), and a
+    note says so.
+    """
     top = int(np.argmin(work.z))
     lower = min(float(work.z[: top + 1].max()), float(work.z[top:].max()))
     depths = np.linspace(GAUGE_SIDE_DEPTH + 3e-3, min(lower, 0.032), 12)
     if depths[-1] - depths[0] < 3e-3:
         return None
-    left, right = [], []
-    for depth in depths:
-        inner = int(np.flatnonzero(work.z[: top + 1] <= depth)[0])
-        outer = top + int(np.flatnonzero(work.z[top:] <= depth)[-1])
-        if inner == 0 or outer == work.y.size - 1:
-            return None
-        left.append(_crossing(work, inner - 1, inner, depth))
-        right.append(_crossing(work, outer, outer + 1, depth))
-    middle = 0.5 * (np.array(left) + np.array(right))
+    chords = _chords(work.y, work.z, depths)
+    if chords is None:
+        return None
+    middle = chords.mean(axis=0)
     slope, offset = np.polyfit(depths, middle, 1)
     if np.max(np.abs(middle - slope * depths - offset)) > 0.2e-3:
         return None  # the flanks are not straight: worn, or not a flat-bottom rail
-    return float(slope)
+    growth = 0.5 * float(np.polyfit(depths, chords[1] - chords[0], 1)[0])
+    angle = np.arctan(slope)
+    y = work.y * np.cos(angle) - work.z * np.sin(angle)
+    z = work.y * np.sin(angle) + work.z * np.cos(angle)
+    upper = _chords(y, z - z.min(), np.linspace(3e-3, 9e-3, 7))
+    skew = float((upper.mean(axis=0) - offset * np.cos(angle)).mean()) if upper is not None else 0.0
+    if abs(skew) < LARGEST_SKEW and growth < STEEP_FLANK:
+        return float(slope)
+    work.notes.append("one side of the head is worn: the gauge side is taken at negative y")
+    usual = np.min(np.abs(np.array((0.0, *STANDARD_INCLINATIONS)) - abs(slope))) < 3e-3
+    return float(slope) if usual and 0.04 < growth < 0.062 else None
 
 
-def _crossing(work: Points, i: int, j: int, depth: float) -> float:
-    share = (depth - work.z[i]) / (work.z[j] - work.z[i])
-    return float(work.y[i] + share * (work.y[j] - work.y[i]))
+def _chords(y: Floats, z: Floats, depths: Floats) -> Floats | None:
+    """Left and right ends of the chords at depths below the top, float64[2, n]."""
+    top = int(np.argmin(z))
+    ends = []
+    for depth in depths:
+        inner = int(np.flatnonzero(z[: top + 1] <= depth)[0])
+        outer = top + int(np.flatnonzero(z[top:] <= depth)[-1])
+        if inner == 0 or outer == y.size - 1:
+            return None
+        pairs = slice(inner, inner - 2 if inner > 1 else None, -1), slice(outer, outer + 2)
+        ends.append([np.interp(depth, z[pair], y[pair]) for pair in pairs])
+    return np.array(ends).T
 
 
 def _check_steps(work: Points, kind: Kind) -> None:
@@ -375,8 +460,26 @@ def _check_steps(work: Points, kind: Kind) -> None:
 
 
 def _check_overhang(work: Points, kind: Kind, y: Floats, z: Floats) -> None:
-    """Refuse a contour that runs back where wheel and rail touch."""
-    overhang = np.flatnonzero(used_part(y, z, kind) & (np.diff(y) <= 0.0))
+    """Refuse a contour that runs back where wheel and rail touch.
+
+    A rail may be worn to a vertical or overhanging face: no wheel reaches what lies below its edge.
+    """
+    used, dy = used_part(y, z, kind), np.diff(y)
+    back = dy <= 0.0
+    if kind == "rail":
+        back |= np.abs(np.diff(z)) > np.tan(np.radians(80.0)) * dy
+        top = int(np.argmin(z))
+        for side, after, face in (
+            ("gauge", slice(0, top), np.flatnonzero(back[:top])[-1:]),
+            ("field", slice(top, None), top + np.flatnonzero(back[top:])[:1]),
+        ):
+            depth = min(z[face[0]], z[face[0] + 1]) if face.size else 0.0
+            if depth > HIGHEST_FACE:
+                back[after] = False
+                if depth < DEEPEST_FACE:
+                    words = f"{side} face vertical or nearly so from {1e3 * depth:.1f} mm down"
+                    work.notes.append(words)
+    overhang = np.flatnonzero(used & back)
     if overhang.size:
         at = int(overhang[0])
         found = f"the contour runs back at y = {1e3 * y[at]:.1f} mm"

@@ -66,10 +66,15 @@ def smoothed_points(work: Points) -> tuple[Floats, Floats]:
 
 def _noise(s: Floats, values: Floats) -> float:
     """Robust estimate of the noise of samples over s [unit of values]."""
-    n = values.size
-    if n < 8:
-        return 0.0
-    centre = np.arange(2, n - 2)
+    return float(np.median(np.abs(departures(s, values))) / 0.6745) if s.size >= 8 else 0.0
+
+
+def departures(s: Floats, values: Floats) -> Floats:
+    """How far samples over s stand from the cubic through their four neighbours, shape (n - 4,).
+
+    Each over the factor by which noise of the five points widens it [unit of values].
+    """
+    centre = np.arange(2, s.size - 2)
     neighbours = centre[:, None] + np.array([-2, -1, 1, 2])
     weights = np.ones((centre.size, 4))
     near = s[neighbours]
@@ -79,4 +84,4 @@ def _noise(s: Floats, values: Floats) -> float:
                 weights[:, a] *= (s[centre] - near[:, b]) / (near[:, a] - near[:, b])
     predicted = np.sum(weights * values[neighbours], axis=1)
     spread = np.sqrt(1.0 + np.sum(weights**2, axis=1))
-    return float(np.median(np.abs(values[centre] - predicted) / spread) / 0.6745)
+    return np.asarray((values[centre] - predicted) / spread)

@@ -152,6 +152,53 @@ def test_wheel_is_put_right_and_the_note_says_so(tmp_path, how, note):
     assert same_contact(profile, "S1002") < (5e-6 if how == "one outlier" else 1.5e-6)
 
 
+@pytest.mark.parametrize("height", [0.05, -0.1, 0.25])  # mm
+@pytest.mark.parametrize(("name", "at"), [("S1002", 400), ("60E1", 200)])
+def test_outlier_far_beyond_the_noise_is_left_out(tmp_path, name, at, height):
+    y, z = points(name)
+    z[at] += height
+    profile = load_profile(written(tmp_path, "p.csv", csv_mm(y, z)))
+    assert f"1 outliers left out (line {at + 2})" in profile.notes
+    assert same_contact(profile, name) < 5e-6
+
+
+def test_edges_of_worn_rails_are_no_outliers(tmp_path):
+    path = written(tmp_path, "rail.csv", csv_mm(*side_cut(6.0, 0.0)))
+    assert not any("outlier" in note for note in load_profile(path, "rail").notes)
+
+
+@pytest.mark.parametrize("shift", [-5.0, 1.0, 5.0])
+def test_origin_is_told_by_the_flange_back_wherever_the_flange_lies(tmp_path, shift):
+    y, z = WHEEL
+    profile = load_profile(written(tmp_path, "wheel.csv", csv_mm(y + shift, z)), "wheel")
+    assert any(f"origin moved by {-shift:.2f} mm" in line for line in profile.notes)
+    assert same_contact(profile, "S1002") < 1.5e-6
+
+
+def test_wheel_cut_off_before_the_flange_back_keeps_its_origin(tmp_path):
+    y, z = (values[WHEEL[0] > -66.0] for values in WHEEL)
+    profile = load_profile(written(tmp_path, "wheel.csv", csv_mm(y, z)), "wheel")
+    assert not profile.notes
+    assert same_contact(profile, "S1002") < 1.5e-6
+
+
+def test_shift_to_the_rolling_circle_is_told_as_it_is_where_points_run_back(tmp_path):
+    # points 0.05 mm apart with noise of 20 um are no function of y
+    y, z = points("S1002", every=1)
+    noise = np.random.default_rng(3).normal(0.0, 0.02, (2, y.size))
+    path = written(tmp_path, "wheel.csv", csv_mm(y + noise[0], z + 4.0 + noise[1]))
+    told = [note for note in load_profile(path, "wheel").notes if note.startswith("z moved")]
+    assert [float(note.split()[3]) for note in told] == [pytest.approx(-4.0, abs=0.01)]
+
+
+def test_points_that_nearly_coincide_do_not_make_a_slope_of_their_rounding(tmp_path):
+    y, z = WHEEL
+    y, z = np.insert(y, 500, y[499] + 1e-4), np.insert(z, 500, z[499] + 1e-4)
+    profile = load_profile(written(tmp_path, "wheel.csv", csv_mm(y, z)), "wheel")
+    assert any("double points" in note for note in profile.notes)
+    assert same_contact(profile, "S1002") < 1.5e-6
+
+
 @pytest.mark.parametrize("scale", [1.0, 1e-3])
 def test_units_are_told_by_the_size_when_the_header_is_wrong(tmp_path, scale):
     y, z = WHEEL
@@ -182,6 +229,46 @@ def test_upright_rail_stays_as_it_was_measured_whatever_the_noise(tmp_path, seed
     profile = load_profile(written(tmp_path, "rail.csv", csv_mm(y, z + noise)), "rail")
     assert profile.inclination == 0.0
     assert not any("mirrored" in line for line in profile.notes)
+
+
+def side_cut(depth, slope, side=1.0, inclination=0.0):
+    """60E1 with side wear: its depth [mm] 14 mm below the top, the face's slope to the vertical."""
+    y, z = RAIL
+    y = np.where((y < 0.0) & (z > 0.5), np.maximum(y, depth - 36.0 - slope * (z - 14.0)), y)
+    angle = np.arctan(inclination)
+    return (side * (y * np.cos(angle) + z * np.sin(angle)), z * np.cos(angle) - y * np.sin(angle))
+
+
+@pytest.mark.parametrize(
+    ("depth", "slope"), [(2.0, 1e-3), (4.0, 0.07), (4.0, 0.1), (8.0, 0.25), (12.0, 0.3)]
+)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_side_wear_of_an_upright_rail_is_not_taken_for_an_inclination(tmp_path, depth, slope, side):
+    path = written(tmp_path, "rail.csv", csv_mm(*side_cut(depth, slope, side)))
+    profile = load_profile(path, "rail")
+    assert profile.inclination == 0.0
+    assert any("is worn: the gauge side is taken at negative y" in note for note in profile.notes)
+    assert not any("mirrored" in note for note in profile.notes)
+
+
+def test_inclination_between_parallel_flanks_is_recognised_on_a_worn_head(tmp_path):
+    path = written(tmp_path, "rail.csv", csv_mm(*side_cut(3.0, 0.05, -1.0, 1 / 40)))
+    profile = load_profile(path, "rail")
+    assert profile.inclination == pytest.approx(1 / 40, abs=1e-12)
+
+
+@pytest.mark.parametrize("slope", [0.05, 0.0, -0.1])  # of the face; the last one overhangs
+def test_vertical_and_overhanging_faces_of_rails_are_told(tmp_path, slope):
+    path = written(tmp_path, "rail.csv", csv_mm(*side_cut(6.0, slope)))
+    notes = load_profile(path, "rail").notes
+    assert any("gauge face vertical or nearly so from" in note for note in notes), notes
+
+
+def test_overhang_of_the_crown_is_refused_with_its_line(tmp_path):
+    y, z = RAIL
+    y = np.where(np.abs(y - 3.0) < 1.0, y - 1.0, y)
+    with pytest.raises(InputError, match=r"line \d+: .* runs back"):
+        load_profile(written(tmp_path, "rail.csv", csv_mm(y, z)), "rail")
 
 
 def test_rail_measured_on_the_gauge_side_only_is_turned_to_it(tmp_path):
