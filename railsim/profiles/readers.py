@@ -131,8 +131,10 @@ def _csv(file: str, lines: list[str]) -> Points:
             columns, unit = _header(file, number, names)
             named = len(names)
             continue
-        if named and len(cells) == 2 * named and ";" not in text and "," in text:
-            found = f"{len(cells)} values under {named} names: {_shown(cells)}"
+        whole = len(cells) == 4 and all(re.fullmatch(r"[+-]?\d+", cell) for cell in cells)
+        if "," in text and ";" not in text and (whole or len(cells) == 2 * named > 0):
+            words = f"under {named} names" if named else "without decimal points"
+            found = f"{len(cells)} values {words}: {_shown(cells)}"
             remedy = "a decimal comma needs semicolons between the columns, or give decimal points"
             raise _fault(file, number, found, remedy)
         if len(cells) <= max(columns):
@@ -142,13 +144,15 @@ def _csv(file: str, lines: list[str]) -> Points:
 
 
 def _cells(text: str) -> list[str]:
-    """Split a line at its separator: semicolon or tab (then a comma is decimal), comma, blanks."""
+    """Split a line at its separator: semicolon, tab or blanks (then a comma is decimal), comma."""
     for separator in (";", "\t"):
         if separator in text:
             return [cell.strip().replace(",", ".") for cell in text.split(separator)]
-    if "," in text:
-        return [cell.strip() for cell in text.split(",")]
-    return text.split()
+    words = text.replace(",", ".").split()
+    decimal = len(words) > 1 and " ," not in text and None not in map(_number, words)
+    if decimal or "," not in text:
+        return words
+    return [cell.strip() for cell in text.split(",")]
 
 
 def _header(file: str, line: int, names: list[str]) -> tuple[tuple[int, int], float | None]:
@@ -251,13 +255,15 @@ def _miniprof(file: str, lines: list[str]) -> Points:
         text = line.strip()
         if not text or text.startswith('"'):
             continue  # a quotation mark begins a remark
-        words = text.replace(",", " ").split()
+        words = _cells(text)
         numeric = len(words) > 1 and _number(words[0]) is not None and _number(words[1]) is not None
         if "=" in text or (not rows and not numeric):
             key, _, value = text.partition("=")
             facts[key.strip().lower()] = value.strip()
             if key.strip().lower() == "columndef" and value:
                 columns = _miniprof_columns(file, number, value)
+            elif "=" not in text and "columndef" in facts:
+                raise _fault(file, number, f"not a pair of numbers: {_shown(words)}")
             continue
         if len(words) <= max(columns):
             raise _fault(file, number, f"{len(words)} columns: {_shown(words)}")

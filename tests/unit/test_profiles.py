@@ -111,6 +111,28 @@ def test_file_of_each_format_gives_the_profile_it_was_made_of(tmp_path, suffix, 
     assert same_contact(profile, "S1002" if kind == "wheel" else "60E1") < print_error
 
 
+@pytest.mark.parametrize(
+    ("suffix", "head", "separator", "comma"),
+    [
+        (".txt", "", "  ", ","),
+        (".txt", "", "\t", ","),
+        (".csv", "y_mm;z_mm\n", "; ", ","),
+        (".txt", "", " , ", "."),
+        (".whl", "Filename=x\nColumnDef=X,Y\n\n", ";", ","),
+        (".whl", "Filename=x\nColumnDef=X,Y\n\n", " ", ","),
+        (".whl", "Filename=x\nColumnDef=X,Y\n\n", ";", "."),
+        (".whl", "Filename=x\nColumnDef=X,Y\n\n", ",", "."),
+    ],
+)
+def test_decimal_commas_and_separators_of_measuring_devices(
+    tmp_path, suffix, head, separator, comma
+):
+    rows = (f"{a:.6f}\0{b:.6f}\n".replace(".", comma) for a, b in zip(*WHEEL, strict=True))
+    text = head + "".join(rows).replace("\0", separator)
+    profile = load_profile(written(tmp_path, "wheel" + suffix, text), "wheel")
+    assert same_contact(profile, "S1002") < 1.5e-6
+
+
 def changed_wheel(how):
     y, z = WHEEL
     rng = np.random.default_rng(1)
@@ -382,6 +404,18 @@ def test_letters_are_refused_with_their_line(tmp_path):
     fault = refused(tmp_path, "\n".join(lines))
     assert fault.key == "line 100"
     assert "abc" in fault.found
+
+
+def test_decimal_commas_between_commas_are_refused_with_the_remedy(tmp_path):
+    rows = [f"{a:.3f},{b:.3f}".replace(".", ",") for a, b in zip(*WHEEL, strict=True)]
+    fault = refused(tmp_path, "\n".join(rows))
+    assert (fault.key, "semicolons" in fault.allowed) == ("line 1", True)
+
+
+def test_letters_between_the_points_of_miniprof_are_refused_with_their_line(tmp_path):
+    path = written(tmp_path, "wheel.whl", miniprof(*WHEEL).replace("\n-5", "\nx-5"))
+    with pytest.raises(InputError, match=r"line \d+: not a pair of numbers: 'x-5"):
+        load_profile(path, "wheel")
 
 
 def test_rail_given_as_wheel_and_wheel_given_as_rail_are_refused(tmp_path):
