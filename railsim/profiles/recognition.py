@@ -86,6 +86,9 @@ def recognised_profile(work: Points, kind: Kind | None = None) -> Profile:
     _check_steps(work, kind)
     y, z = smoothed_points(work)
     _check_overhang(work, kind, y, z)
+    if y[-1] < 0.040 if kind == "wheel" else z[-1] - z.min() < 3e-3:
+        beyond = "no contact is found" if kind == "wheel" else "the rail goes on straight"
+        work.notes.append(f"field side ends at y = {1e3 * y[-1]:.1f} mm: beyond it {beyond}")
     level = float(np.interp(0.0, *_function_part(y, z)) if kind == "wheel" else z.min())
     if kind == "wheel" and abs(level) > 1e-5:
         work.notes.append(f"z moved by {-1e3 * level:.3f} mm: zero at the nominal rolling circle")

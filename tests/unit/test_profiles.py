@@ -293,6 +293,16 @@ def test_overhang_of_the_crown_is_refused_with_its_line(tmp_path):
         load_profile(written(tmp_path, "rail.csv", csv_mm(y, z)), "rail")
 
 
+@pytest.mark.parametrize(
+    ("contour", "end", "told"), [(WHEEL, 35.0, True), (WHEEL, 45.0, False), (RAIL, 10.0, True)]
+)
+def test_field_side_that_ends_where_contact_may_lie_is_told(tmp_path, contour, end, told):
+    part = contour[0] < end
+    path = written(tmp_path, "p.csv", csv_mm(contour[0][part], contour[1][part]))
+    notes = load_profile(path, "wheel" if contour is WHEEL else "rail").notes
+    assert any(note.startswith("field side ends at y") for note in notes) == told
+
+
 def test_rail_measured_on_the_gauge_side_only_is_turned_to_it(tmp_path):
     y, z = RAIL
     part = (y > -20.0) & (z < 20.0)  # crown and right flank, here the gauge side
