@@ -59,6 +59,11 @@ def prepare(
     unusual = [*vehicle_remarks(vehicle, model), *gauge_remarks(model.flat, track)]
     unusual += narrow_remarks(model, track.gauge)
     remarks: list[str] = [*balance.remarks, *map(str, unusual), *measured_remarks(track)]
+    remarks += [
+        f"Profile {name}: {'; '.join(profile.notes)}."
+        for name, profile in model.profiles.items()
+        if profile.notes and name not in (profiles or ())
+    ]
     if before is None:
         state, on_the_way = start_state(
             model,

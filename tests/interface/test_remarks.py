@@ -123,3 +123,14 @@ def test_lost_peak_is_one_that_tables_list(second):
         stored = np.abs(result["Q"][result["time"] > 1.2 - 1e-9]).max()
         assert f"{1e-3 * listed.value:.2f} kN over all steps" in found[0]
         assert f"{1e-3 * stored:.2f} kN in the stored" in found[0]
+
+
+def test_run_remarks_on_what_was_recognised_in_the_files_of_its_profiles(tmp_path):
+    rail = railsim.load_profile("60E1")
+    rows = "".join(f"{y!r},{-z!r}\n" for y, z in zip(rail.y.tolist(), rail.z.tolist(), strict=True))
+    (tmp_path / "rail.csv").write_text("y,z\n" + rows)
+    track = railsim.load_track("straight").with_values({"rail": str(tmp_path / "rail.csv")})
+    result = railsim.simulate(railsim.load_vehicle("wagon_y25"), track, speed=20.0, duration=0.01)
+    assert [remark for remark in result.remarks if remark.startswith("Profile")] == [
+        f"Profile {tmp_path / 'rail.csv'}: z pointed upwards: turned."
+    ]
