@@ -39,7 +39,9 @@ def smoothed_points(work: Points) -> tuple[Floats, Floats]:
     """
     y, z = work.y, work.z
     s = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))))
-    noise = np.hypot(_noise(s, y), _noise(s, z))
+    # noise along the contour hardly shows: it moves a point and its position s alike
+    across = np.hypot(departures(s, y), departures(s, z))
+    noise = float(np.median(across) / 0.6745) if across.size > 3 else 0.0
     if noise < NOISE_FLOOR:
         return y, z
     if noise > LARGEST_NOISE:
@@ -62,11 +64,6 @@ def smoothed_points(work: Points) -> tuple[Floats, Floats]:
         f"{1e6 * np.sqrt(np.mean(change**2)):.1f} um rms, {1e6 * change.max():.0f} um at most"
     )
     return smooth_y, smooth_z
-
-
-def _noise(s: Floats, values: Floats) -> float:
-    """Robust estimate of the noise of samples over s [unit of values]."""
-    return float(np.median(np.abs(departures(s, values))) / 0.6745) if s.size >= 8 else 0.0
 
 
 def departures(s: Floats, values: Floats) -> Floats:

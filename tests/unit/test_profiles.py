@@ -365,6 +365,16 @@ def test_measuring_noise_is_smoothed_and_the_effect_is_told(tmp_path, noise):
     assert found == pytest.approx(exact.equivalent_conicity([0.003])[0], abs=0.01)
 
 
+@pytest.mark.parametrize("size", [0.005, 0.02])  # mm
+@pytest.mark.parametrize("name", ["S1002", "60E1"])
+def test_noise_that_is_told_is_that_of_the_points(tmp_path, name, size):
+    y, z = points(name)
+    noise = np.random.default_rng(11).normal(0.0, size, (2, y.size))
+    profile = load_profile(written(tmp_path, "p.csv", csv_mm(y + noise[0], z + noise[1])))
+    told = next(float(note.split()[2]) for note in profile.notes if note.startswith("noise of"))
+    assert told == pytest.approx(1e3 * size, rel=0.12)
+
+
 def test_a_wheel_hollow_beside_its_rolling_circle_is_zero_on_it(tmp_path):
     """Its lowest point near the circle lies 5 mm outside of it, and not inside as on others."""
     y, z = WHEEL
