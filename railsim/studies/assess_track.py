@@ -47,6 +47,7 @@ from railsim.table import Amount, Column, Table
 from railsim.track.irregularity import measured_remarks
 
 PIECE, RUN_IN, BEYOND = 2000.0, 200.0, 60.0  # m
+RUN_OUT = 3.0  # s, behind which the band pass from 0.4 Hz has forgotten the end of a record
 APART = 25.0  # m
 POINTS = "floor_front", "floor_rear"
 # 1/s; Hz, low pass of EN 14363; Hz, up to which runs store what that needs; m
@@ -213,13 +214,13 @@ def assess_track(
     runs: list[_Run] = []
     behind = {name: _behind(vehicle) for name, vehicle in tested.items()}
     for number, (a, b) in enumerate(pairwise(edges.tolist())):
-        part, moved = _part(track, a, b + max(behind.values()))
+        part, moved = _part(track, a, b + max(behind.values()) + RUN_OUT * max(speeds))
         for name, vehicle in tested.items():
             for speed in speeds:
                 label = f"{name}_{speed:g}_{number:04d}"
                 case = Case(
                     label, vehicle, part, settings, float(speed), max(0.0, a - moved - RUN_IN),
-                    until=min(b + behind[name] - moved, part.length),
+                    until=min(b + behind[name] + RUN_OUT * speed - moved, part.length),
                     labels={"vehicle": name, "track": part.name, "speed": float(speed)},
                 )  # fmt: skip
                 runs.append(_Run(case, a, b, moved))
