@@ -1,8 +1,9 @@
 """Filtered signals of a part of a run; each filter is applied once, each signal formed once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from railsim.assessment.record import Record
 from railsim.assessment.safety import overturning
 from railsim.assessment.sections import TestSection
 from railsim.result.filters import band_passed, distance_means, window_centres
+
+T = TypeVar("T")
 
 Band = tuple[float | None, float]
 """Lower and upper corner of a filter [Hz]; without the lower one a low pass."""
@@ -77,18 +80,31 @@ class Signals:
         self.record, self.f0, self.causal = record, f0, causal
         self._begin, self._end = begin, end
         self._rows = record.rows_between(begin, end, WIDEST)
-        self.raw = cache(self._raw)
-        self.filtered = cache(self._filtered)
-        self.signal = cache(self._signal)
+        # not caches of methods: these hold their object, and its arrays stay until the next search
+        # for garbage
+        self._known: dict[Hashable, Any] = {}
 
-    def _signal(
+    def _once(self, key: Hashable, found: Callable[[], T]) -> T:
+        if key not in self._known:
+            self._known[key] = found()
+        known: T = self._known[key]
+        return known
+
+    def signal(
         self, form: "Callable[[Signals, Band | None], Signal | None]", band: Band | None
     ) -> Signal | None:
         """Return the signal that `form` forms of this part, once."""
-        return form(self, band)
+        return self._once((form, band), lambda: form(self, band))
+
+    def raw(self, name: str) -> Floats:
+        """Quantity over the rows of the widest margin; ``acceleration`` is that of all sensors."""
+        return self._once(name, lambda: self._raw(name))
+
+    def filtered(self, name: str, band: Band | None) -> Floats:
+        """Quantity over the rows of the part with the margin of the filter, filtered once."""
+        return self._once((name, band), lambda: self._filtered(name, band))
 
     def _raw(self, name: str) -> Floats:
-        """Quantity over the rows of the widest margin; ``acceleration`` is that of all sensors."""
         if name == "acceleration":
             return self.record.readings(self._rows)[0]
         return self.record.part(name, self._rows)

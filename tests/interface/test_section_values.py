@@ -4,6 +4,8 @@ A tone passes a zero-phase Butterworth filter with its gain alone, so that every
 known in closed form; percentiles and means over distance are taken of that.
 """
 
+import gc
+import weakref
 from unittest.mock import Mock
 
 import numpy as np
@@ -17,6 +19,7 @@ from railsim.assessment.criteria import CRITERIA, steering
 from railsim.assessment.en14363 import section_values
 from railsim.assessment.record import Record
 from railsim.assessment.sections import TestSection
+from railsim.assessment.signals import Signals, wheel_load
 
 RATE, G = 1000.0, 9.81
 TONES = np.array([0.2, 0.9, 3.1, 5.3, 8.7, 13.0, 21.0])  # Hz
@@ -216,6 +219,22 @@ def test_a_record_covers_what_the_whole_vehicle_passed_after_the_start(speed, be
     """
     record = Record(made(track({"type": "STR", "length": 200.0}), speed, **FINE), "run")
     assert record.covered() == pytest.approx((begin, 200.0 - speed / RATE - 10.78))
+
+
+def test_signals_of_a_part_need_no_search_for_garbage():
+    """A campaign would hold all that it has filtered: commands search seldom for garbage."""
+    record = Record(made(track({"type": "STR", "length": 200.0}), 20.0, **FINE), "run")
+    signals = Signals(record, 80.0, 150.0, f0=None, causal=False)
+    kept = signals.signal(wheel_load, FORCE)
+    assert signals.signal(wheel_load, FORCE) is kept
+    assert signals.filtered("Q", FORCE) is signals.filtered("Q", FORCE)
+    gone = weakref.ref(signals)
+    gc.disable()
+    try:
+        del signals
+        assert gone() is None
+    finally:
+        gc.enable()
 
 
 def test_steering_index_is_that_of_the_gauge_in_the_middle_of_the_section():
