@@ -74,19 +74,32 @@ def _solved(model: Model) -> Model:
         design = with_preloads(model.design).system
         preloads = design.links.spring[:, 2], design.mounts.preload
         return _levelled(with_these_preloads(model, *preloads))
-    conditions = _conditions(model.system)
-    # springs carry the weight of a fixed body where they can
-    weights = [(int(body), 2) for body in model.system.bodies.fixed]
     free_lengths = any(e.definition.has_free_length for e in model.flat.elements)
-    for wanted in [[*conditions, *weights], conditions] if weights else [conditions]:
-        filled, rest = _with_solved_preloads(model, _auto_preloads(model), wanted)
-        unbalanced = [] if free_lengths else _unbalanced(model, wanted, rest)
-        if not unbalanced:
-            return _with_pressing_wedges(filled)
+    filled, unbalanced = _balanced(model, _auto_preloads(model), given=free_lengths)
+    if not unbalanced:
+        return _with_pressing_wedges(filled)
     raise ModelError(
         f"no static equilibrium of '{model.flat.name}': the springs with preload cannot carry the "
         "vehicle in its nominal position; unbalanced: " + "; ".join(unbalanced)
     )
+
+
+def _balanced(
+    model: Model, support: dict[int, float], *, given: bool = False
+) -> tuple[Model, list[str]]:
+    """Return the model with the preloads of `support`, and what they leave unbalanced.
+
+    Springs carry the weight of a fixed body where they can.  `given`: others follow from their
+    lengths, and what they leave moves the bodies.
+    """
+    conditions = _conditions(model.system)
+    weights = [(int(body), 2) for body in model.system.bodies.fixed]
+    for wanted in [[*conditions, *weights], conditions] if weights else [conditions]:
+        filled, rest = _with_solved_preloads(model, support, wanted)
+        unbalanced = [] if given else _unbalanced(model, wanted, rest)
+        if not unbalanced:
+            break
+    return filled, unbalanced
 
 
 def _with_pressing_wedges(model: Model) -> Model:
@@ -115,9 +128,7 @@ def static_shares(model: Model, *, solved: bool = False) -> dict[str, float]:
     support = _auto_preloads(model, known_lengths=True)
     filled = model
     if not solved:
-        conditions = _conditions(model.system)
-        filled, rest = _with_solved_preloads(model, support, conditions)
-        unbalanced = _unbalanced(model, conditions, rest)
+        filled, unbalanced = _balanced(model, support)
         if unbalanced and not len(model.system.bodies.fixed):
             raise ModelError(
                 "the springs cannot carry the vehicle in its nominal position; unbalanced: "

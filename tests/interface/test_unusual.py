@@ -11,7 +11,9 @@ from railsim import cli
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
+from railsim.model.assembly import without_rails
 from railsim.model.plausibility import gauge_remarks, narrow_remarks, vehicle_remarks
+from railsim.model.preloads import static_shares
 from railsim.profiles import load_profile
 from railsim.result import peak
 from railsim.simulation import disturbance
@@ -167,6 +169,20 @@ def test_admissible_speed_in_kilometres_per_hour_is_remarked():
 def test_slips_of_sign_and_unit_are_remarked(unusual, names, words):
     found = vehicle_remarks(unusual)
     assert any(names in remark.key and words in remark.text for remark in found), found
+
+
+def test_springs_below_a_held_body_carry_it():
+    """A frame of 1 t on soft springs from a held car of 8 t: they press with 39.2 kN each."""
+    found = vehicle(
+        body={"position": [0.0, 0.0, -0.6], "mass": 1e3, "inertia": [600.0, 900.0, 900.0]},
+        spring={"points": [[0.0, 1.0, -0.6], [0.0, 1.0, -0.5]]},
+    ).model_dump(exclude_none=True)
+    found["bodies"]["car"] = {**BODY, "position": [0.0, 0.0, -1.5], "fixed": "track"}
+    above = {"bodies": ["car", "frame"], "points": [[0.0, 1.0, -1.0], [0.0, 1.0, -0.7]]}
+    found["elements"]["above"] = {**SPRING, **above}
+    held = Vehicle.model_validate(found)
+    assert static_shares(without_rails(held))["above.left"] == pytest.approx(4e3 * 9.81)
+    assert not vehicle_remarks(held)
 
 
 @pytest.mark.parametrize("kind", ["spring_damper", "bushing"])
