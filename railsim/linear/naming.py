@@ -11,7 +11,8 @@ hunting        a wheelset whose yaw V/(omega y) is 1 +- 0.3 and about 90 degrees
                and whose y is at least half of the largest lateral motion; of the bogie that moves
                most
 bogie          the frames have 30 % of the energy and more: bounce, pitch, roll, lateral, yaw,
-               longitudinal, in phase or out of phase between the bogies
+               longitudinal, in phase or out of phase between the bogies; of a lighter body of a
+               bogie, such as an axle-hung motor, after that (motor pitch)
 rolling        the whole vehicle runs along the track: eigenvalue zero
 =============  ==================================================================================
 
@@ -109,8 +110,7 @@ def mode_name(parts: Parts, modes: Eigenmodes, k: int = 0) -> str:
         return _car_name(parts, shape, shares)
     frames = list(parts.frames)
     if frames and shares[frames].sum() > LEAST_OF_FRAMES:
-        component = int(np.argmax(shares[frames].sum(axis=0)))
-        return f"bogie {BOGIE_NAMES[component]}{_phase(parts, shape, component)}"
+        return _bogie_name(parts, shape, shares)
     body, component = divmod(int(np.argmax(shares)), shares.shape[1])
     if body in parts.cars:
         return _car_name(parts, shape, shares)
@@ -144,14 +144,25 @@ def _car_name(parts: Parts, shape: Complexes, shares: Floats) -> str:
     return "lower sway" if (y * roll.conjugate()).real > 0.0 else "upper sway"
 
 
-def _phase(parts: Parts, shape: Complexes, component: int) -> str:
-    """Whether the outermost bogies move together or against each other."""
-    if len(parts.frames) < 2:
+def _bogie_name(parts: Parts, shape: Complexes, shares: Floats) -> str:
+    """Name of a mode of bogies: a motor on its axles has its own name, the heaviest body none."""
+    component = int(np.argmax(shares[list(parts.frames)].sum(axis=0)))
+    body = max(parts.frames, key=lambda b: float(shares[b, component]))
+    names, mass = parts.model.index.bodies, parts.model.system.bodies.mass
+    bogie = [b for b in parts.frames if parts.bogie_of(b) == parts.bogie_of(body)]
+    heaviest = mass[body] >= max(mass[b] for b in bogie)
+    words = "bogie" if heaviest else names[body].split(".")[-1].replace("_", " ")
+    alike = [b for b in parts.frames if names[b].split(".")[1:] == names[body].split(".")[1:]]
+    return f"{words} {BOGIE_NAMES[component]}{_phase(parts, shape, component, alike)}"
+
+
+def _phase(parts: Parts, shape: Complexes, component: int, alike: list[int]) -> str:
+    """Whether a body moves together in the outermost bogies, or against each other."""
+    if len(alike) < 2:
         return ""
-    first, last = (parts.component(shape, parts.frames[k], component) for k in (0, -1))
+    first, last = (parts.component(shape, alike[k], component) for k in (0, -1))
     if min(abs(first), abs(last)) < 0.1 * max(abs(first), abs(last)):
-        moving = parts.frames[0] if abs(first) > abs(last) else parts.frames[-1]
-        return f", {parts.bogie_of(moving)}"
+        return f", {parts.bogie_of(alike[0] if abs(first) > abs(last) else alike[-1])}"
     return ", in phase" if (first * last.conjugate()).real > 0.0 else ", out of phase"
 
 

@@ -265,6 +265,18 @@ def test_other_bodies_and_free_rolling_have_their_names():
     assert named({(0, Z): 1.0, (1, Z): 1.0}, cars=(0, 1)) == "car bodies bounce"
 
 
+def test_axle_hung_motors_have_their_name_and_are_compared_with_their_like():
+    """Of the bogies only like bodies tell the phase: a motor says nothing of another's frame."""
+    bodies = ("front.frame", "front.motor", "rear.motor", *BODIES[3:])
+
+    def name(moves):
+        return named(moves, bodies=bodies, cars=())
+
+    assert name({(1, Z): 1.0, (2, Z): -1.0}) == "motor bounce, out of phase"
+    assert name({(1, PITCH): 1.0, (2, PITCH): 0.05}) == "motor pitch, front"
+    assert name({(0, Z): 1.0, (2, Z): -0.5}) == "bogie bounce"
+
+
 # motion -----------------------------------------------------------------------------------------
 
 
