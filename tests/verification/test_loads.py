@@ -101,6 +101,20 @@ def test_a_wagon_stands_where_springs_of_known_length_carry_it(straight, sided):
     assert body[2] - z_axle == pytest.approx(sinking, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    "spring",
+    [
+        {"kind": "bushing", "point": [0.0, 1.0, -0.5], "stiffness": [1e6, 1e6, 1e6]},
+        {"kind": "spring_damper", "points": [[0.0, 1.0, -0.8], [0.0, 1.0, -0.5]]},
+    ],
+)
+def test_a_measured_length_without_seats_or_stiffness_is_refused_by_its_key(spring):
+    spring = {**spring, "bodies": ["body", "axle"], "load_at_length": [12e3, 0.3]}
+    vehicle = wagon().model_dump(exclude_none=True) | {"elements": {"spring": spring}}
+    with pytest.raises(ValueError, match="'load_at_length' need"):
+        Vehicle.model_validate(vehicle)
+
+
 def test_two_stage_spring_stands_on_its_second_stage_when_laden(straight):
     stage = {
         "kind": "bump_stop",

@@ -227,7 +227,9 @@ class VerticalSpring(PreloadAlongAxes, FreeLength):
     @base.check
     def _length_needs_seats(self) -> None:
         if self.has_free_length and (self.points is None or self.stiffness[2] == 0.0):
-            raise ValueError("a free length needs 'points' at two heights and a stiffness along z")
+            raise ValueError(
+                "'free_length' and 'load_at_length' need two 'points' and a stiffness along z"
+            )
 
     def with_known_preload(self, point1: base.Vector, point2: base.Vector) -> Self:
         """Return the spring with the preload of its length: compression pushes the seats apart."""

@@ -49,7 +49,7 @@ class SpringDamper(base.FreeLength, base.SidedElement):
         if self.series_stiffness > 0.0 and not given:
             raise ValueError("'series_stiffness' needs 'damping' or 'damper_table'")
         if self.has_free_length and self.stiffness == 0.0:
-            raise ValueError("a free length needs 'stiffness'")
+            raise ValueError("'free_length' and 'load_at_length' need 'stiffness'")
 
     def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
         """Return the spring with the preload of its length, tension positive."""
