@@ -383,7 +383,8 @@ def severe(speed):
 
 
 def exceeded(share):
-    return Assessed.exceeded.fget(SimpleNamespace(share=share))
+    estimate = SimpleNamespace(value=2.0 * share)
+    return Assessed.exceeded.fget(SimpleNamespace(estimate=estimate, limit=2.0))
 
 
 # a function, and its values at a border and beside it
@@ -400,7 +401,7 @@ AT_THE_BORDER = {
         lambda x: StationaryValue("", "", x, 1.0, "").exceeded, [(1.0, False), (above(1.0), True)]
     ),
     "of a model too, in the mean": (
-        lambda x: compared(x, 1.0), [(0.5, "pass"), (below(0.5), "fail")]
+        lambda x: compared(x, 1.0), [(0.5, "pass"), (below(0.5), "pass"), (0.499999, "fail")]
     ),
     "and in the standard deviation": (
         lambda x: compared(1.0, x), [(math.sqrt(0.125), "pass"), (0.3535, "fail")]
