@@ -24,6 +24,7 @@ class RunProgress:
         by_distance = (end - inputs.start) / inputs.speed
         self._length = min(inputs.duration or math.inf, by_distance)  # of the run [s]
         self._judged = self._run_in = 0.0  # simulated before it [s]
+        self._ways = 2 if inputs.start > 0.0 else 1  # into a curve: a run-in is about as long
         self._on_its_way = False
         self._fraction = 0.0
         self._tell(0.0)
@@ -34,7 +35,7 @@ class RunProgress:
             self._tell(self._fraction)
             return
         self._judged = done
-        self._tell(done / (whole + self._length))
+        self._tell(done / (self._ways * whole + self._length))
 
     def of_run_in(self, done: float, whole: float) -> None:
         """Take the time of a run-in that has been simulated, and all of it [s]."""

@@ -124,17 +124,21 @@ def test_finished_fraction_is_that_of_the_simulated_time():
         track=SimpleNamespace(length=260.0), start=60.0, speed=20.0, until=None, duration=None
     )
     course = RunProgress(told.append, inputs)
-    course.of_judgement(5.0, 5.0)  # so far the run-in is not known of: of 15 s
+    course.of_judgement(5.0, 5.0)  # a run-in is taken for as long, as the run does not start at 0
     course.of_run_in(4.0, 10.0)
     course.of_run_in(10.0, 10.0)
     for done in (0.0, 0.6, 1.0 - 1e-13):
         course.of_run(done)
     # what was told is not taken back
-    expected = [0.0, 5.0 / 15.0, 9.0 / 25.0, 15.0 / 25.0, 15.0 / 25.0, 21.0 / 25.0, 1.0]
+    expected = [0.0, 5.0 / 20.0, 9.0 / 25.0, 15.0 / 25.0, 15.0 / 25.0, 21.0 / 25.0, 1.0]
     assert told == pytest.approx(expected, abs=1e-12)
     assert told[-1] == 1.0
     for short in (SimpleNamespace(**{**vars(inputs), "until": 100.0}),
                   SimpleNamespace(**{**vars(inputs), "duration": 2.0})):  # fmt: skip
         other = RunProgress(told.append, short)
         other.of_judgement(6.0, 6.0)
-        assert told[-1] == pytest.approx(6.0 / 8.0)
+        assert told[-1] == pytest.approx(6.0 / 14.0)
+    RunProgress(told.append, SimpleNamespace(**{**vars(inputs), "start": 0.0})).of_judgement(
+        2.0, 7.0
+    )
+    assert told[-1] == pytest.approx(2.0 / 20.0)  # 13 s of run, and no run-in

@@ -221,7 +221,7 @@ def test_progress_of_a_run_counts_its_run_in():
     assert seen == sorted(seen)
     assert seen[0] == 0.0
     assert seen[-1] == 1.0
-    # 112 m in calls of ten thousand steps of up to 2.5 ms
+    # 112 m in calls of ten thousand steps of 0.25 ms, behind the judgement of the step
     assert sum(0.0 < fraction < 0.9 for fraction in seen) >= 2
 
 
