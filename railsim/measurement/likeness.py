@@ -34,10 +34,12 @@ class Likeness:
     lag: float  # by which the measured one comes later [s]
     drift: float  # change of the lag over the record [s]; nan where it is not clear
 
-    def remark(self, name: str, step: float) -> str:
-        """Return what looks wrong, empty if nothing does."""
+    def remark(self, name: str, step: float, *, sided: bool = False) -> str:
+        """Return what looks wrong, empty if nothing does; `sided`: the other side has one too."""
         if self.correlation < OPPOSITE:
-            return f"{name} has the opposite sign (correlation {self.correlation:.2f}): 'reverse'?"
+            other = ", or that of the other side" * sided  # loads of both are opposite
+            found = f"the opposite sign (correlation {self.correlation:.2f})"
+            return f"{name} has {found}: 'reverse'{other}?"
         for words, factor in UNITS:
             if 1.0 / NEAR < self.ratio / factor < NEAR and (
                 self.correlation > ALIKE or max(factor, 1.0 / factor) > 100.0
@@ -130,10 +132,8 @@ def suspicions(
             said.append(f"{name} is like the simulated {exchanged[name]}, not its own: exchanged?")
             continue
         own = {"lag": clocks * (one.lag - common), "drift": clocks * (one.drift - drift)}
-        words = replace(one, **own).remark(name, step)
-        if words.endswith("'reverse'?") and quantities[name].endswith(SIDES):
-            words = f"{words[:-1]}, or that of the other side?"  # loads of both are opposite
-        said.append(words)
+        sided = quantities[name].endswith(SIDES)
+        said.append(replace(one, **own).remark(name, step, sided=sided))
     if clocks and abs(drift) > APART * step:
         said.append(
             f"All channels run apart from the simulation by {1e3 * drift:.3g} ms over the "
