@@ -69,8 +69,8 @@ def solutions_of_session(tmp_path_factory):
 def stored_solutions(request, solutions_of_session):
     """Equilibria and steps are found once a session: of six files of runs a fifth less time.
 
-    They are found anew in a test that has replaced something, the folder it works in and arguments
-    of a command apart: it may be what finds them.
+    A test that has replaced something, the folder it works in and arguments of a command apart, may
+    have replaced what finds them: it finds them anew, once after each replacement.
     """
     folder = solutions_of_session
     for kind in ("small", "smooth", "coarse"):  # tables are no part of a solution's key
@@ -81,9 +81,16 @@ def stored_solutions(request, solutions_of_session):
     def folder_now(_):
         if "monkeypatch" not in request.fixturenames:
             return folder
-        patch = request.node.funcargs.get("monkeypatch")  # None: a fixture is at work
-        unknown = patch is None or patch._setitem or any(at is not sys for at, *_ in patch._setattr)
-        return None if unknown else folder
+        patch = request.node.funcargs.get("monkeypatch")
+        if patch is None:  # a fixture is at work
+            return None
+        replaced = [at for at, *_ in patch._setattr if at is not sys]
+        if not replaced and not patch._setitem:
+            return folder
+        own = request.getfixturevalue("tmp_path_factory").getbasetemp() / "solutions_of_tests"
+        own /= f"{id(request.node)}_{len(replaced)}_{len(patch._setitem)}"
+        own.mkdir(exist_ok=True, parents=True)
+        return own
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(railsim.model.solutions, "solutions_folder", folder_now)

@@ -13,21 +13,26 @@ second order halfway between them: there the sticking cells must not slip.  Slid
 directions at their own centres, where the slip is extrapolated from upstream.  (Compared at the
 halfway points too, the error in spin falls with the first power of the cell only.)
 
-Accuracy: docs/validation/creep.md.  Cost: 0.1 s for 28 x 28 cells after the matrices of an ellipse
-ratio are made (1 s, kept).  For the time loop use `law="table"`, which was made with this solver.
+Accuracy: docs/validation/creep.md.  Cost: some tenths of a second for 28 x 28 cells after the
+matrices of an ellipse ratio are made (as long, kept).  For the time loop use `law="table"`, which was made with this solver.
 """
 
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import lu_factor, lu_solve
 
-from railsim.arrays import Flags, Floats
+from railsim.arrays import Flags, Floats, Indices
 from railsim.errors import ModelError
-from railsim.kernels.halfspace import CONVERGED, rolling_matrices, rolling_traction
+from railsim.kernels.halfspace import rolling_matrices
 
 _TOLERANCE = 1e-6  # turn of the tractions at which Newton's method ends [rad]
 _ITERATIONS = 60
+_MAX_TURN = 0.7  # largest turn of a traction's direction in one iteration [rad]
+# Most cases need 5 to 11 iterations.  After _SETTLED of them, where only a share _FEW of the cells
+# still changes sides, those that go to and fro are kept in stick at their _MAX_RETURNS-th return.
+_SETTLED, _FEW, _MAX_RETURNS = 15, 0.05, 2
 # At once, or where that does not converge (fine grids, spin against lateral creepage) step by step.
 _WAYS = ((1.0,), (0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0))
 
@@ -89,41 +94,103 @@ class Rolling:
     """Traction and slip on a grid, each solution started from the one before.
 
     `bound`: of the traction, by default that of the grid. Over mu N/(a b) are `traction`,
-    float64[2, n], and over mu N/(G a b) `slip`; `sticks`, int64[n]: stick or slip.
+    float64[2, n], and over mu N/(G a b) `slip`; `sticks`, bool[n]: stick or slip.
     """
 
     def __init__(self, grid: RollingGrid, bound: Floats | None = None) -> None:
         self.grid = grid
         self._bound = grid.bound.ravel() if bound is None else bound
         self.traction, self.slip = np.zeros((2, 2, grid.x.size))
-        self.sticks = np.ones(grid.x.size, dtype=np.int64)
+        self.sticks = np.ones(grid.x.size, dtype=bool)
 
     def solve(self, xi_x: float, xi_y: float, phi: float, share: float = 1.0) -> bool:
         """Solve for a share of creepages over mu N/(G a b) (spin: times sqrt(a b) before).
 
-        Returns whether the iteration ended by itself.
+        Newton's method on active sets. A cell either sticks (no slip at its point in `middle`) or
+        slides (traction at the bound, along the slip at its centre). Each iteration solves the
+        linearised equations of both sets, then moves cells whose traction exceeds the bound to the
+        sliding ones and those whose slip opposes the traction to the sticking ones. A few cells at
+        the border may satisfy neither (the two conditions are asked for at points half a cell
+        apart) and would go to and fro: in the end they are kept in stick, and their traction is
+        cut back to the bound. Returns whether the iteration ended by itself.
         """
-        grid = self.grid
+        grid, p, bound = self.grid, self.traction, self._bound
         across = (xi_x - phi * grid.y).ravel()
-        status, _ = rolling_traction(
-            grid.middle,
-            grid.centre,
-            share * np.stack([across, (xi_y + phi * grid.x_middle).ravel()]),
-            share * np.stack([across, (xi_y + phi * grid.x).ravel()]),
-            self._bound,
-            self.traction,
-            self.sticks,
-            self.slip,
-            _TOLERANCE,
-            _ITERATIONS,
+        rigid_middle = share * np.stack([across, (xi_y + phi * grid.x_middle).ravel()])
+        rigid_centre = share * np.stack([across, (xi_y + phi * grid.x).ravel()])
+        returns, moved = np.zeros(bound.size, dtype=np.int64), bound.size
+        for count in range(1, _ITERATIONS + 1):
+            self.slip = _slips(grid.centre, p, rigid_centre)
+            turn = self._step(_slips(grid.middle, p, rigid_middle))
+            self.slip = _slips(grid.centre, p, rigid_centre)
+            beyond = self.sticks & (np.hypot(*p) > bound * (1.0 + 1e-9)) & (returns < _MAX_RETURNS)
+            back = ~self.sticks & (np.sum(p * self.slip, axis=0) < 0.0)
+            returns[back] += count > _SETTLED and moved <= _FEW * bound.size
+            self._cut_back(beyond)
+            self.sticks ^= beyond | back
+            moved = int(np.count_nonzero(beyond | back))
+            if moved == 0 and turn < _TOLERANCE:
+                self._cut_back(np.hypot(*p) > bound)
+                return True
+        self.slip = _slips(grid.centre, p, rigid_centre)
+        self._cut_back(np.hypot(*p) > bound)
+        return False
+
+    def _step(self, slip_middle: Floats) -> float:
+        """Take a step of Newton's method and return the largest turn of a traction.
+
+        Unknowns: change of both tractions of the cells that stick, change of the angle of the
+        traction of those that slide. Equations: no slip there, slip parallel to traction here.
+        """
+        p, slip = self.traction, self.slip
+        (stick,), (slide,) = np.nonzero(self.sticks), np.nonzero(~self.sticks)
+        ns, n = len(stick), 2 * len(stick) + len(slide)
+        cos, sin = p[:, slide] / self._bound[slide]
+        # single precision is enough for a step of Newton's method, and half as dear
+        A, r = np.empty((n, n), np.float32), np.empty(n, np.float32)
+        A[:ns], A[ns : 2 * ns] = self._changes(self.grid.middle[:, stick], stick, slide)
+        of_x, of_y = self._changes(self.grid.centre[:, slide], stick, slide)
+        A[2 * ns :] = cos[:, None] * of_y - sin[:, None] * of_x
+        sliding = np.arange(2 * ns, n)
+        A[sliding, sliding] -= cos * slip[0, slide] + sin * slip[1, slide]
+        r[: 2 * ns] = -slip_middle[:, stick].ravel()
+        r[2 * ns :] = sin * slip[0, slide] - cos * slip[1, slide]
+        # A lies by rows, where the factorisation wants columns: that of the transpose needs no copy
+        factors = lu_factor(A.T, overwrite_a=True, check_finite=False)
+        change = lu_solve(factors, r, trans=1, check_finite=False).astype(np.float64)
+        p[:, stick] += change[: 2 * ns].reshape(2, ns)
+        turn = np.clip(change[2 * ns :], -_MAX_TURN, _MAX_TURN)
+        p[:, slide] = self._bound[slide] * np.stack(
+            [np.cos(turn) * cos - np.sin(turn) * sin, np.sin(turn) * cos + np.cos(turn) * sin]
         )
-        return bool(status == CONVERGED)
+        return float(np.max(np.abs(turn), initial=0.0))
+
+    def _changes(self, rows: Floats, stick: Indices, slide: Indices) -> tuple[Floats, Floats]:
+        """Changes of both slips, in rows of a matrix, with the unknowns of a step."""
+        p_x, p_y = self.traction[:, slide]
+        (xx, xy, yy), (xx_t, xy_t, yy_t) = rows[:, :, stick], rows[:, :, slide]
+        return (
+            np.hstack([xx, xy, xy_t * p_x - xx_t * p_y]),
+            np.hstack([xy, yy, yy_t * p_x - xy_t * p_y]),
+        )
+
+    def _cut_back(self, cells: Flags) -> None:
+        """Shorten the tractions of some cells to the bound."""
+        p = self.traction
+        p[:, cells] *= self._bound[cells] / np.hypot(*p[:, cells])
 
     def force(self) -> Floats:
         """T_x and T_y over mu N, M_z over mu N sqrt(a b)."""
         area, x, y = self.grid.area.ravel(), self.grid.x.ravel(), self.grid.y.ravel()
         t_x, t_y = self.traction
         return np.array([area @ t_x, area @ t_y, area @ (x * t_y - y * t_x)])
+
+
+def _slips(matrix: Floats, p: Floats, rigid: Floats) -> Floats:
+    """Slip of every cell: rigid part plus elastic part of the traction."""
+    xx, xy, yy = matrix
+    elastic: Floats = np.stack([xx @ p[0] + xy @ p[1], xy @ p[0] + yy @ p[1]])
+    return rigid + elastic
 
 
 @lru_cache(maxsize=4)
@@ -214,7 +281,7 @@ def exact_creep_force(
         raise ModelError("exact creep force: the iteration for stick and slip did not converge")
     shape = (2, *grid.x.shape)
     t_x, t_y = unit * rolling.traction.reshape(shape)
-    slip, sticks = rolling.slip.reshape(shape), rolling.sticks.reshape(shape[1:]).astype(bool)
+    slip, sticks = rolling.slip.reshape(shape), rolling.sticks.reshape(shape[1:])
     x, y, area = size * grid.x, size * grid.y, a * b * grid.area
     free = np.where(sticks, 0.0, unit / G)
     return ExactCreepForce(
