@@ -14,7 +14,8 @@ directions at their own centres, where the slip is extrapolated from upstream.  
 halfway points too, the error in spin falls with the first power of the cell only.)
 
 Accuracy: docs/validation/creep.md.  Cost: some tenths of a second for 28 x 28 cells after the
-matrices of an ellipse ratio are made (as long, kept).  For the time loop use `law="table"`, which was made with this solver.
+matrices of an ellipse ratio are made (as long, kept).  For the time loop use `law="table"`, which
+was made with this solver.
 """
 
 from functools import lru_cache

@@ -16,6 +16,7 @@ import pytest
 from selection import points
 
 import railsim
+from railsim.cli import main
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 KEPT = json.loads((BENCHMARKS / "results" / "irregular.json").read_text(encoding="utf-8"))
@@ -37,6 +38,7 @@ SMALL = {
 # the threads of a process, its memory, another program's solvers
 OWN_PROCESS = {"growth.py", "peers.py", "study_cost.py"}
 COMPILES = {"whole.py"}
+COMMANDS = {"mechanisms.py", "springs.py"}  # their commands run here, without pictures
 IMPORTED = {"commands.py", "cores.py", "exudyn_coach.py", "exudyn_contact.py",
             "loops.py", "numpy_fastsim.py", "parts.py", "scipy_peer.py",
             "timed_runs.py"}  # fmt: skip
@@ -103,9 +105,25 @@ def runs_in_its_small_form(script, tmp_path, monkeypatch, capsys):
     return capsys.readouterr().out
 
 
-@pytest.mark.parametrize("script", sorted({*SMALL} - OWN_PROCESS - COMPILES))
+@pytest.mark.parametrize("script", sorted({*SMALL} - OWN_PROCESS - COMPILES - COMMANDS))
 def test_script_runs_in_its_small_form(script, tmp_path, monkeypatch, capsys):
     assert runs_in_its_small_form(script, tmp_path, monkeypatch, capsys)
+
+
+@pytest.mark.parametrize("script", sorted(COMMANDS))
+def test_script_that_gives_commands_runs_in_its_small_form(
+    script, tmp_path, monkeypatch, capsys, undrawn
+):
+    def run(command, **_):
+        assert command[:3] == [sys.executable, "-m", "railsim"]
+        return done.append(main(command[3:]))
+
+    done = []
+    monkeypatch.setattr(subprocess, "run", run)
+    with undrawn():
+        assert runs_in_its_small_form(script, tmp_path, monkeypatch, capsys)
+    assert done
+    assert not any(done)
 
 
 def test_all_of_railsim_is_measured_in_a_small_form(tmp_path, monkeypatch, capsys):

@@ -146,7 +146,7 @@ def test_load_to_one_side_is_leant_to_its_own_side():
     assert unloading[0.08] == pytest.approx(unloading[0.0] * Q0 / lighter, rel=0.02)
 
 
-@pytest.mark.usefixtures("guided")
+@pytest.mark.usefixtures("guided", "small_contact_tables")
 def test_a_vehicle_whose_ends_differ_is_said_to_be_tested_with_one_of_them_ahead():
     """Metro trailer with its body 0.8 m off: guiding 0.895 or 0.983, whichever end leads."""
     on, limits = railsim.load_track("straight"), load_stationary_limits("stationary")
