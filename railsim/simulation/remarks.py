@@ -83,11 +83,14 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             run.work.vibration,
             Q0,
             wheelsets,
-            irregular=irregular,
-            uneven=uneven,
-            struck=bool(model.check.check.size),
+            vibration_cause(
+                hunts=hunts,
+                uneven=uneven,
+                irregular=irregular,
+                struck=bool(model.check.check.size),
+                slides=bool(model.system.track.rail[:, 4:, 0].any()),  # of both rails, in its cells
+            ),
             elastic=bool(support.elastic),
-            hunts=hunts,
         ),
         alternation(run.work.vibration, Q0, wheelsets, int(run.work.parts[DIVIDED])),
         commanded_dampers(
@@ -272,21 +275,12 @@ def commanded_dampers(system: System, names: Sequence[str], memory: Floats, step
 
 
 def vibration(
-    measured: Floats,
-    Q0: Floats,
-    wheelsets: Sequence[str],
-    *,
-    irregular: bool,
-    elastic: bool,
-    uneven: bool = False,
-    struck: bool = False,
-    hunts: bool = False,
+    measured: Floats, Q0: Floats, wheelsets: Sequence[str], cause: str, *, elastic: bool
 ) -> str:
     """Remark on wheel loads that vibrate, as a high pass at 40 Hz shows them.
 
-    `measured`: see `railsim.kernels.vibration`; `Q0`: static wheel loads [N]; `irregular`,
-    `elastic`: the rails; `uneven`: wheels are not round; `struck`: there are check rails, whose
-    blow or friction may be the cause; `hunts`: the vehicle hunts.
+    `measured`: see `railsim.kernels.vibration`; `Q0`: static wheel loads [N]; `cause`: see
+    `vibration_cause`; `elastic`: the rails.
     """
     if not len(measured):
         return ""
@@ -295,15 +289,6 @@ def vibration(
     if not share[w, side] > VIBRATES:
         return ""
     frequency, position = measured[w, side, FREQUENCY], measured[w, side, POSITION]
-    if hunts:
-        cause = "the vehicle hunts"
-    elif uneven:
-        cause = "excited by wheels that are not round"
-    elif irregular:
-        cause = "excited by the irregularities or sections of the rails"
-    else:
-        by = "excited by a check rail, or" if struck else "self-excited by"
-        cause = f"{by} sliding friction in flange contact, on smooth rails"
     if not elastic:
         cause += "; the rails are rigid, [support] of the track makes them elastic"
     return (
@@ -311,3 +296,29 @@ def vibration(
         f"(high pass {CUT_OFF:g} Hz) on the {SIDES[side]} wheel of {wheelsets[w]}, "
         f"vehicle at s = {position:.0f} m; {cause}."
     )
+
+
+def vibration_cause(
+    *,
+    hunts: bool = False,
+    uneven: bool = False,
+    irregular: bool = False,
+    struck: bool = False,
+    slides: bool = True,
+) -> str:
+    """What wheel loads vibrate from, in words.
+
+    `hunts`: the vehicle; `uneven`: wheels are not round; `irregular`: the rails; `struck`: there
+    are check rails, whose blow or friction may be the cause; `slides`: there is friction.
+    """
+    if hunts:
+        return "the vehicle hunts"
+    if uneven:
+        return "excited by wheels that are not round"
+    if irregular:
+        return "excited by the irregularities or sections of the rails"
+    if not slides:
+        by = "a check rail or " if struck else ""
+        return f"excited by {by}blows of the flanges, on smooth rails without friction"
+    by = "excited by a check rail, or" if struck else "self-excited by"
+    return f"{by} sliding friction in flange contact, on smooth rails"

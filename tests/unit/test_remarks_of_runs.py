@@ -20,6 +20,7 @@ from railsim.simulation.remarks import (
     stability,
     unsettled_rails,
     vibration,
+    vibration_cause,
 )
 
 
@@ -95,6 +96,8 @@ def test_peaks_of_a_run_that_ends_before_they_are_to_count_are_told():
         ({}, "by sliding friction"),
         ({"struck": True}, "by a check rail, or sliding friction"),
         ({"hunts": True}, "hunts"),
+        ({"slides": False}, "excited by blows of the flanges, on smooth rails without friction"),
+        ({"slides": False, "struck": True}, "excited by a check rail or blows of the flanges"),
     ],
 )
 def test_the_remark_on_vibrations_contradicts_neither_itself_nor_another(of, cause):
@@ -105,7 +108,7 @@ def test_the_remark_on_vibrations_contradicts_neither_itself_nor_another(of, cau
     measured = np.zeros((2, 2, VIBRATION))
     measured[1, 0, [AMPLITUDE, FREQUENCY]] = 7e3, 35.2
     remark = vibration(
-        measured, np.full((2, 2), 70e3), ("a", "b"), irregular=False, elastic=True, **of
+        measured, np.full((2, 2), 70e3), ("a", "b"), vibration_cause(**of), elastic=True
     )
     assert remark.startswith("The wheel loads vibrate at 35 Hz: 10 % of Q0")
     assert "above" not in remark
