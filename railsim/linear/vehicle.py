@@ -22,6 +22,7 @@ from railsim.linear.steady import SteadyRolling, led
 from railsim.linear.system import Linearisation
 from railsim.model.assembly import Model, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
+from railsim.model.plausibility import profile_remarks
 from railsim.model.work import without_loads
 from railsim.profiles import Profile
 from railsim.profiles.builtin import cone
@@ -154,7 +155,7 @@ class LinearVehicle:
         self.model: Model = balance.model
         self.Q0: Floats = balance.Q0
         omitted = left_out(vehicle, track, settings or Settings(), assembled)
-        self.remarks = (*balance.remarks, *omitted)
+        self.remarks = (*balance.remarks, *profile_remarks(assembled, known), *omitted)
         if self.curvature * cant < 0.0:
             self.remarks += (
                 "cant on the wrong side, the outer rail is the lower one: cant is positive in "

@@ -5,7 +5,7 @@ and what the kernels read (arrays with indices).  `Index` keeps the way back.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from railsim.definitions.track.layout import is_straight_and_level
 from railsim.definitions.track.support import Support as SupportDefinition
 from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.vehicle.laws import Law
-from railsim.errors import Fault, Faults, ModelError, input_error
+from railsim.errors import Fault, Faults, ModelError, changed_faults, input_error
 from railsim.kernels.aligned import CACHE_LINE, aligned
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.state import N_SCALARS, contact_begin, internal_begin, velocity_begin
@@ -344,6 +344,11 @@ def _contact(
             used[name] = profiles.get(name) or load_profile(name, kind=kind)
         return used[name]
 
+    def of_track(fault: Fault) -> Fault:
+        # some commands take a track of standard gauge where none is named
+        where = f"the track is '{track.name}', for another gauge name its own (TRACK, --track)"
+        return replace(fault, allowed=f"{fault.allowed}; {where}")
+
     wheelsets = flat.of_kind("wheelset")
     alike: dict[str, Any] = {
         "gauge": track.gauge,
@@ -371,7 +376,8 @@ def _contact(
             if key not in keys:
                 keys[key] = len(tables)
                 wheel, rail = profile(of_wheel, "wheel"), profile(of_rail, "rail")
-                tables.append(make_table(wheel, rail, **own, **alike))
+                with changed_faults(of_track):
+                    tables.append(make_table(wheel, rail, **own, **alike))
             which[w, side] = keys[key]
     if not tables:
         raise ModelError("a vehicle needs at least one wheelset")

@@ -142,6 +142,15 @@ def narrow_remarks(model: "Model", gauge: float) -> list[Remark]:
     return [gathered(text, names) for text, names in texts.items()]
 
 
+def profile_remarks(model: "Model", given: Iterable[str] | None = None) -> tuple[str, ...]:
+    """Remarks on what was recognised and corrected in profiles, but for those `given` as such."""
+    return tuple(
+        f"Profile {name}: {'; '.join(profile.notes)}."
+        for name, profile in model.profiles.items()
+        if profile.notes and name not in (given or ())
+    )
+
+
 def gathered(what: str, names: Sequence[str]) -> Remark:
     """Return one remark for several parts with the same finding, the first ones by name."""
     return Remark(listed(names), what)

@@ -16,7 +16,12 @@ from railsim.kernels.state import TIME
 from railsim.model.assembly import Model, assemble
 from railsim.model.control import periods, with_control
 from railsim.model.equilibrium import Equilibrium, stored_equilibrium
-from railsim.model.plausibility import gauge_remarks, narrow_remarks, vehicle_remarks
+from railsim.model.plausibility import (
+    gauge_remarks,
+    narrow_remarks,
+    profile_remarks,
+    vehicle_remarks,
+)
 from railsim.model.time_step import SCHEMES
 from railsim.profiles import Profile
 from railsim.result import Sink
@@ -59,11 +64,7 @@ def prepare(
     unusual = [*vehicle_remarks(vehicle, model), *gauge_remarks(model.flat, track)]
     unusual += narrow_remarks(model, track.gauge)
     remarks: list[str] = [*balance.remarks, *map(str, unusual), *measured_remarks(track)]
-    remarks += [
-        f"Profile {name}: {'; '.join(profile.notes)}."
-        for name, profile in model.profiles.items()
-        if profile.notes and name not in (profiles or ())
-    ]
+    remarks += profile_remarks(model, profiles)
     if before is None:
         state, on_the_way = start_state(
             model,

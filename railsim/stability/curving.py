@@ -36,6 +36,7 @@ from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.linear.vehicle import WALKING_PACE
 from railsim.model.assembly import assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
+from railsim.model.plausibility import profile_remarks
 from railsim.model.time_step import Stability
 from railsim.model.work import CONSTANT_SPEED, against_rails, without_loads
 from railsim.notation import ROLL, YAW
@@ -309,7 +310,7 @@ class _Search:
         balance = equilibrium(assembled, WALKING_PACE)
         self.model = balance.model
         self.Q0 = balance.Q0
-        self.remarks = balance.remarks
+        self.remarks = (*balance.remarks, *profile_remarks(assembled, profiles))
         self.pads = int(np.count_nonzero(self.model.system.internal.kind == PAD))
         if self.pads:
             self.remarks += (

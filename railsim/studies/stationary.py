@@ -42,6 +42,7 @@ from railsim.linear.stationary import (
 from railsim.linear.steady import NotConverged
 from railsim.model.assembly import Model, assemble
 from railsim.model.equilibrium import Equilibrium, equilibrium
+from railsim.model.plausibility import profile_remarks
 from railsim.notation import SIDES
 from railsim.stability.curving import FAILED, curving
 from railsim.table import Amount, Column, Table
@@ -212,7 +213,8 @@ def stationary(
     name = f"cant {1e3 * cant:g} mm"
     both = found(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
     values += _lean(name, balance.model, flat.reference, both or [], cant, limits)
-    remarks = (*balance.remarks, *left_out(vehicle, track, settings, model))
+    omitted = left_out(vehicle, track, settings, model)
+    remarks = (*balance.remarks, *profile_remarks(model), *omitted)
     if any(value.quantity == UNLOADING and value.value > 1.0 for value in values):
         remarks += (LIFTED,)
     axles = balance.Q0.sum(axis=1)

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from railsim.cli import main
 from railsim.errors import InputError
 from railsim.linear.modes import Mode, Modes, RootLocus, numbered
 from railsim.linear.vehicle import Contact
+from railsim.model import assembly
+from railsim.profiles import load_profile
 
 
 def test_modes_at_one_speed(capsys):
@@ -22,6 +25,31 @@ def test_modes_at_one_speed(capsys):
     assert lines[0].endswith("contact tangent")
     assert any(line.startswith("lower sway") for line in lines)
     assert any(line.startswith("front hunting") for line in lines)
+
+
+def test_what_was_put_right_in_a_profile_is_told_as_by_run(monkeypatch, capsys):
+    turned = replace(load_profile("S1002"), notes=("flange at positive y: mirrored", "sorted by y"))
+    profiles = {"S1002": turned, "60E1": load_profile("60E1")}
+    monkeypatch.setattr(assembly, "load_profile", lambda name, kind: profiles[name])
+    assert main(["modes", "coach_manchester"]) == 0
+    words = "Profile S1002: flange at positive y: mirrored; sorted by y."
+    assert f"remark: {words}" in capsys.readouterr().out
+    coach = railsim.load_vehicle("coach_manchester")
+    given = railsim.modes(coach, profiles={"S1002": turned})
+    assert not any("mirrored" in one for one in given.remarks)  # its owner has the notes
+
+
+@pytest.mark.parametrize("command", [["modes"], ["info", "--static"]])
+def test_a_vehicle_of_another_gauge_is_told_where_its_track_is_named(command, tmp_path, capsys):
+    path = tmp_path / "metre.toml"
+    path.write_text(
+        'format = "railsim-vehicle/1"\nname = "Metre gauge"\nextends = "coach_manchester"\n'
+        "[assemblies.bogie.assemblies.axle.wheelsets.wheelset]\nback_to_back = 0.925\n"
+    )
+    assert main([*command, str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "falls between the rails" in said
+    assert "the track is 'Straight track, 1000 m', for another gauge name its own (TRACK" in said
 
 
 def test_what_the_table_leaves_out_is_counted():
