@@ -1,4 +1,4 @@
-"""Eigenmodes of a linearisation, followed over a parameter; the first loss of stability.
+"""Eigenmodes of a linearisation, followed over a parameter.
 
 With A r = lambda r and l A = lambda l, a mode has the frequency f = Im(lambda)/2pi, the undamped
 frequency f0 = |lambda|/2pi and the damping ratio zeta = -Re(lambda)/|lambda|.
@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eig, eigvals
+from scipy.linalg import eig
 
 from railsim.arrays import Complexes, Floats, Indices
 from railsim.linear.system import Linearisation
@@ -21,15 +21,12 @@ from railsim.linear.system import Linearisation
 At = Callable[[float], Linearisation]
 
 SEARCHED = (0.3, 40.0)  # Hz, where hunting and the yaw and roll of frames are looked for
-LOWEST = 0.1  # Hz, of an oscillation that loses its stability: sways on cones of 0.005 have 0.28
 SLOWEST = 1e-3  # Hz; below it a mode is no oscillation
 GROWS = 0.05  # 1/s of motions about an unstable state
-ROUNDING = 1e-9  # 1/s, growth that counts as none: without friction some modes are not damped
 SAME = 0.6  # pairing of neighbouring modes that needs no look in between
 UNRELATED = 0.1  # pairing below which two modes are not the same
 EQUAL = 0.02  # relative distance of eigenvalues that cannot be distinguished
 MOST_HALVINGS = 3
-STEP = 0.2  # of the parameter, in which a loss of stability is looked for
 
 
 @dataclass(frozen=True)
@@ -138,7 +135,7 @@ def _partners(
     apart = np.abs(one - other) / (np.abs(one) + np.abs(other))
     # of modes with nearly the same eigenvalue any mixture is a mode: the nearer value decides
     scores = shared - apart
-    from scipy.optimize import linear_sum_assignment  # long to import, as below
+    from scipy.optimize import linear_sum_assignment  # 0.7 s, which one speed does not need
 
     rows, columns = linear_sum_assignment(-scores)
     pairs = {
@@ -178,115 +175,3 @@ def divergence(modes: Eigenmodes) -> tuple[str, ...]:
         "that is linearised for one beside it, as on hollow treads, whose radius falls towards the "
         "flange at first; modes and linear critical speeds are not those of where it runs",
     )
-
-
-@dataclass(frozen=True)
-class LossOfStability:
-    """Where an equilibrium loses its stability to an oscillation, or that it does not."""
-
-    # lowest value with Re(lambda) = 0 (a Hopf bifurcation); None: none in the range
-    parameter: float | None
-    already: bool  # whether the equilibrium is unstable at the range's lower end
-    # the critical one at `parameter`; without it the least damped ones at both ends of the range
-    modes: tuple[Eigenmodes, ...]
-
-
-def loss_of_stability(
-    at: At,
-    low: float,
-    high: float,
-    counts: Callable[[Eigenmodes], bool] | None = None,
-    points: int = 12,
-) -> LossOfStability:
-    """Find the lowest parameter at which an oscillation is no longer damped.
-
-    The range is looked through in steps of a share `STEP` of the parameter, and where the growth
-    has a peak near zero between them: a vehicle may be unstable over 4 m/s only, when the frequency
-    of hunting passes that of its body's sway.
-
-    `at`: parameter to linearisation; `low`, `high`: range of the search; `counts`: whether a mode
-    that is undamped counts; by default all do; `points`: least number of values of the parameter at
-    which the range is looked through.
-    """
-    known: dict[float, float] = {}
-
-    def modes(parameter: float) -> Eigenmodes:
-        return _least_damped(eigenmodes(at(parameter)), counts)
-
-    def growth(parameter: float) -> float:
-        if parameter not in known:
-            # half of the time without vectors, by which modes are told apart where one is undamped
-            values = np.asarray(eigvals(at(parameter).matrix), dtype=complex)
-            known[parameter] = float(np.max(values[_searched(values)].real)) - ROUNDING
-            if counts is not None and known[parameter] >= 0.0:
-                known[parameter] = float(modes(parameter).eigenvalues[0].real) - ROUNDING
-        return known[parameter]
-
-    if growth(low) >= 0.0:
-        return LossOfStability(None, True, (modes(low),))
-    before = passed = low
-    while passed < high:
-        after = min(high, passed + min((high - low) / (points - 1), STEP * passed))
-        after = high if high - after < 1e-9 * high else after
-        half, first = 0.5 * (passed + after), before == passed
-        span = (before, half if first else passed, after, low if first else None)
-        unstable = after if growth(after) >= 0.0 else _beyond_zero(growth, *span)
-        if unstable is None and after == high:  # a peak in the last interval
-            unstable = _beyond_zero(growth, passed, half, after, high)
-        if unstable is not None:
-            stable = passed if unstable > passed else before
-            from scipy.optimize import brentq
-
-            root = float(brentq(growth, stable, unstable, xtol=1e-7 * high, rtol=1e-12))
-            return LossOfStability(root, False, (modes(root),))
-        before, passed = passed, after
-    return LossOfStability(None, False, (modes(low), modes(high)))
-
-
-def _beyond_zero(
-    growth: Callable[[float], float],
-    before: float,
-    middle: float,
-    after: float,
-    end: float | None = None,
-) -> float | None:
-    """Where a peak about the middle one of three parameters is not negative, if it may be.
-
-    A parabola rises over the largest of three values at equal distances by an eighth of what this
-    is above the least one, at most; more is looked into where peaks are sharper.  `end` of the
-    range: beyond it nothing is known, the slope there says whether the growth rises inwards.
-    """
-    low, peak, high = map(growth, (before, middle, after))
-    looked = peak >= max(low, high) and 2.0 * peak - min(low, high) >= 0.0
-    if end is not None:  # whose tangent leads to zero on the way to the middle
-        inside = end + 0.01 * (middle - end)
-        looked |= growth(end) + 100.0 * (growth(inside) - growth(end)) >= 0.0
-    if not looked:
-        return None
-    from scipy.optimize import minimize_scalar
-
-    found = minimize_scalar(
-        lambda x: -growth(x), bounds=(before, after), method="bounded", options={"maxiter": 12}
-    )
-    return float(found.x) if found.fun <= 0.0 else None
-
-
-def _least_damped(
-    modes: Eigenmodes, counts: Callable[[Eigenmodes], bool] | None = None
-) -> Eigenmodes:
-    """The mode of largest growth among the oscillations searched, if undamped one that counts.
-
-    Where no mode counts, the least damped of those that decay.
-    """
-    inside = _searched(modes.eigenvalues)
-    ordered = [modes.taken([int(k)]) for k in inside[np.argsort(-modes.eigenvalues[inside].real)]]
-    if counts is not None:
-        ordered = [m for m in ordered if m.eigenvalues[0].real < 0.0 or counts(m)] or ordered
-    return ordered[0]
-
-
-def _searched(eigenvalues: Complexes) -> Indices:
-    """Indices of the oscillations from `LOWEST` to 40 Hz; of all where there is none."""
-    frequency = eigenvalues.imag / (2.0 * np.pi)
-    inside = np.flatnonzero((frequency >= LOWEST) & (frequency <= SEARCHED[1]))
-    return inside if len(inside) else np.arange(len(eigenvalues))

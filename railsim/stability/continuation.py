@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from railsim.errors import ModelError
-from railsim.linear.eigenmodes import LossOfStability
+from railsim.linear.stability_loss import LossOfStability
 from railsim.stability.branches import Branch, Point
 from railsim.stability.motion import LeftRange, VehicleMotion
 from railsim.stability.periodic import PeriodicMotion, Shooting

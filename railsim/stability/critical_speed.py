@@ -15,18 +15,11 @@ from railsim.definitions.limits import Situation
 from railsim.definitions.loading import load_running_limits, load_track
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Faults, InputError, ModelError
-from railsim.linear.eigenmodes import (
-    SEARCHED,
-    Eigenmodes,
-    LossOfStability,
-    divergence,
-    eigenmodes,
-    loss_of_stability,
-    oscillations,
-)
+from railsim.linear.eigenmodes import SEARCHED, Eigenmodes, divergence, eigenmodes, oscillations
 from railsim.linear.harmonic import ContactPath
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import mode_name, parts_of
+from railsim.linear.stability_loss import LossOfStability, loss_of_stability
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, conditions, smooth_law
 from railsim.notation import COMPONENTS
 from railsim.profiles import Profile

@@ -11,8 +11,9 @@ from selection import points
 import railsim
 from railsim.errors import ModelError
 from railsim.kernels.support import LEARNT
-from railsim.linear.eigenmodes import LossOfStability, eigenmodes
+from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.modes import modes
+from railsim.linear.stability_loss import LossOfStability
 from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.equilibrium import tracks_under

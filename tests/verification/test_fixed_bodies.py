@@ -9,7 +9,7 @@ import railsim
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError
-from railsim.linear.eigenmodes import loss_of_stability
+from railsim.linear.stability_loss import loss_of_stability
 from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium

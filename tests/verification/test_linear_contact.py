@@ -12,8 +12,9 @@ from railsim.contact import table
 from railsim.contact.table import TableGrid
 from railsim.errors import InputError
 from railsim.kernels.time_loop import Chunk, time_loop
-from railsim.linear.eigenmodes import eigenmodes, loss_of_stability, oscillations
+from railsim.linear.eigenmodes import eigenmodes, oscillations
 from railsim.linear.modes import modes, root_locus
+from railsim.linear.stability_loss import loss_of_stability
 from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle, smooth_law
 from railsim.model.time_step import SCHEMES, Stability, empty_recorder

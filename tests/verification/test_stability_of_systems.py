@@ -3,14 +3,10 @@
 import cooperrider
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
-from railsim.linear.eigenmodes import (
-    divergence,
-    eigenmodes,
-    followed,
-    loss_of_stability,
-    oscillations,
-)
+from railsim.linear.eigenmodes import divergence, eigenmodes, followed, oscillations
+from railsim.linear.stability_loss import loss_of_stability
 from railsim.linear.system import Linearisation, jacobian
 from railsim.stability.periodic import Shooting
 
@@ -155,6 +151,23 @@ def test_a_narrow_range_of_instability_is_found_wherever_the_search_begins(peak,
         peak, half = at, 0.1
         lost = loss_of_stability(unstable, low, high)
         assert lost.parameter == pytest.approx(at - 0.1, abs=1e-4)
+
+
+@pytest.mark.parametrize("high", [120.0, 31.5])  # m/s; beyond and below the second loss
+@pytest.mark.parametrize("peak", [22.4, 23.5, 24.6, 28.0, 29.0])
+def test_a_narrow_range_just_below_another_loss_of_stability_is_found(peak, high):
+    """Growth 0.003 (1 - ((V - peak)/1.3)^2) of one oscillator, 0.001 (V - 32) of another.
+
+    Searched from 5 m/s on in steps of a fifth, at 17.9, 21.5, 25.8, 31.0 and 37.2 m/s.
+    """
+
+    def both(speed):
+        growth = 0.003 * (1.0 - ((speed - peak) / 1.3) ** 2), 0.001 * (speed - 32.0)
+        blocks = [[[g, w], [-w, g]] for g, w in zip(growth, (6.0, 9.0), strict=True)]
+        return Linearisation(tuple("xyzw"), block_diag(*blocks), np.zeros(4), speed)
+
+    found = loss_of_stability(both, 5.0, high)
+    assert found.parameter == pytest.approx(peak - 1.3, abs=1e-4)
 
 
 @pytest.mark.parametrize("slope", [0.0125, 0.05])
