@@ -22,7 +22,7 @@ from railsim.linear.eigenmodes import (
     eigenmodes,
     followed,
 )
-from railsim.linear.naming import Parts, mode_name, parts_of
+from railsim.linear.naming import Parts, apart, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
 from railsim.plottable import Plottable
 from railsim.profiles import Profile
@@ -405,6 +405,7 @@ def _named(
     parameter: tuple[str, float] | None = None,
 ) -> Modes:
     c, parts = prepared.coordinates, parts_of(prepared.model, prepared.coordinates)
+    found = apart(parts, found)
     there = ~np.isnan(found.eigenvalues)
     # oscillations are numbered before the modes that no table shows
     order = np.argsort(found.frequencies <= SLOWEST, kind="stable")

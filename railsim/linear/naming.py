@@ -18,20 +18,25 @@ rolling        the whole vehicle runs along the track: eigenvalue zero
 
 Any other mode is called after what has most of its energy: car body, bogie, or wheelsets with the
 component, and which of them move.
+
+Any mixture of modes with the same eigenvalue is a mode too, such as that of two bogies that do not
+feel each other.  Named are those that lie farthest apart along the vehicle, the foremost first.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import eigh
 
 from railsim.arrays import Complexes, Floats
 from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET
 from railsim.linear.coordinates import Coordinates
-from railsim.linear.eigenmodes import Eigenmodes
+from railsim.linear.eigenmodes import SLOWEST, Eigenmodes
 from railsim.model.assembly import Model
 from railsim.notation import COMPONENTS
 
+ALIKE = 1e-6  # relative distance of eigenvalues whose modes are any mixture, by rounding
 NEAR_ZERO = 0.05  # 1/s, |lambda| of rolling
 HUNTING_RATIO = 0.3
 HUNTING_PHASE = np.radians(45.0)
@@ -94,6 +99,31 @@ def parts_of(model: Model, coordinates: Coordinates) -> Parts:
     frames = tuple(b for b in rigid if b not in cars)
     wheelsets = tuple(int(b) for b in model.system.contact.body)
     return Parts(model, coordinates, tuple(cars), frames, wheelsets)
+
+
+def apart(parts: Parts, modes: Eigenmodes) -> Eigenmodes:
+    """Modes in which those of the same eigenvalue are the ones farthest apart along the vehicle.
+
+    Within the space of such modes the place of the kinetic energy, x^H W X x over x^H W x with the
+    inertia W and the position X of each body, is stationary.
+    """
+    c, values, shapes = parts.coordinates, modes.eigenvalues, modes.shapes.copy()
+    own = c.velocities
+    inertia = parts._inertia[c.bodies[own], c.components[own]]
+    place = np.array([body.position[0] for body in parts.model.flat.bodies])[c.bodies[own]]
+    left = np.flatnonzero(modes.frequencies > SLOWEST)
+    while len(left):
+        near = np.abs(values[left] - values[left[0]]) < ALIKE * np.abs(values[left[0]])
+        alike, left = left[near], left[~near]
+        if len(alike) > 1:
+            speeds = shapes[alike][:, own]
+            at, energy = ((speeds.conj() * w) @ speeds.T for w in (inertia * place, inertia))
+            if np.linalg.cond(energy) > 1.0 / ALIKE:  # one shape in two
+                continue
+            mixed = eigh(at, energy)[1][:, ::-1].T @ shapes[alike]
+            largest = np.argmax(np.abs(mixed), axis=1)
+            shapes[alike] = mixed / mixed[np.arange(len(alike)), largest][:, None]
+    return replace(modes, shapes=shapes)
 
 
 def mode_name(parts: Parts, modes: Eigenmodes, k: int = 0) -> str:

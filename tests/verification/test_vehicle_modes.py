@@ -1,5 +1,7 @@
 """Modes with wheelsets held: of the benchmark coach and of all vehicles without friction."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from dynamics import Settings, changed, load_track, load_vehicle, undamped
@@ -8,6 +10,8 @@ from suspension import Suspension
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.modes import Mode, modes
+from railsim.linear.naming import apart, mode_name, parts_of
+from railsim.linear.vehicle import LinearVehicle
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.work import level_track
@@ -213,6 +217,33 @@ def test_a_car_between_held_bogies_bounces_on_its_springs():
     bogies = modes(load_vehicle("benchmark_vehicle1"), speed=20.0, hold=["carbody"])
     assert not any("carbody" in name for mode in bogies for name in mode.participation)
     assert any("hunting" in mode.name for mode in bogies)
+
+
+def test_modes_of_the_same_eigenvalue_are_those_of_the_front_and_rear_bogie_in_any_mixture():
+    """Yaw of the frames of two bogies that do not feel each other, at 26.87 Hz."""
+    speed = 20.0
+    prepared = LinearVehicle(load_vehicle("metro_b_motor"), load_track("straight"))
+    parts = parts_of(prepared.model, prepared.coordinates)
+    found = eigenmodes(prepared.linearised(speed))
+    pair = np.flatnonzero(np.abs(found.frequencies - 26.874) < 1e-3)
+    assert len(pair) == 2
+    frames = [b for b in parts.frames if parts.model.index.bodies[b].endswith(".frame")]
+    for angle, phase in ((0.0, 0.0), (0.7, 0.0), (1.2, 2.0), (0.5 * np.pi, 1.0)):
+        turn = np.exp(1j * phase)
+        mixture = np.array([[1.0, turn], [-1.0 / turn, 1.0]]) * np.cos(angle)
+        mixture[[0, 1], [1, 0]] *= np.tan(angle)
+        shapes = found.shapes.copy()
+        shapes[pair] = mixture @ found.shapes[pair]
+        told = apart(parts, replace(found, shapes=shapes))
+        assert [mode_name(parts, told, k) for k in pair] == ["bogie yaw, front", "bogie yaw, rear"]
+        for k, frame in zip(pair, frames, strict=True):
+            of_frame, *others = parts.energy_shares(told.shapes[k])[[frame, *frames]].sum(axis=1)
+            assert of_frame == pytest.approx(sum(others), rel=1e-4)  # the other one is at rest
+        remaining = (
+            found.linearisation.matrix @ told.shapes[pair].T
+            - told.shapes[pair].T * found.eigenvalues[pair]
+        )
+        assert np.abs(remaining).max() < 1e-5 * abs(found.eigenvalues[pair[0]])
 
 
 def test_a_mode_that_neither_swings_nor_decays_has_no_damping_ratio():
