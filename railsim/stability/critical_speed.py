@@ -235,7 +235,9 @@ def _linear(
         )
 
     lost, stuck = _loss_of_hunting(prepared, low, high), None
-    found.divergence = divergence(eigenmodes(prepared.linearised(low)))
+    # on hollow treads it grows about as the speed: at walking pace it may pass for none
+    ends = (divergence(eigenmodes(prepared.linearised(speed))) for speed in (low, high))
+    found.divergence = next(filter(None, ends), ())
     found.remarks += found.divergence
     if prepared.sticking:
         other = loss_of_stability(prepared.linearised, low, lost.parameter or high)

@@ -1,5 +1,6 @@
 """Non-linear critical speed: three methods on Cooperrider's bogie and on a coach."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import cooperrider
@@ -344,6 +345,23 @@ def test_motions_that_die_above_a_range_of_hunting_are_no_hunting():
     assert found.lowest.speed == pytest.approx(17.0, abs=0.5)
     assert first.end == np.inf
     assert further.end == found.lowest.speed
+
+
+def test_a_departure_from_rest_that_is_slow_at_the_lower_end_is_told(monkeypatch):
+    """It grows by 0.004 V, as on hollow treads: 0.02 1/s at 5 m/s, where it counts as none."""
+    linearised = LinearVehicle.linearised
+
+    def departing(prepared, speed, path=None):
+        found = linearised(prepared, speed, path)
+        matrix = found.matrix.copy()
+        matrix[-1] = 0.0
+        matrix[-1, -1] = 0.004 * speed
+        return replace(found, matrix=matrix)
+
+    monkeypatch.setattr(LinearVehicle, "linearised", departing)
+    coach = load_vehicle("coach_manchester")
+    found = critical_speed(coach, RIGID, methods="linear", high=50.0, over_amplitude=False)
+    assert any("does not oscillate grows by 0.2 1/s" in remark for remark in found.remarks)
 
 
 def test_where_rest_is_unstable_from_the_start_the_type_is_not_known():
