@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 from generators.keys import filled, json_schema, schema_name
 
-from railsim.definitions.loading import FORMATS, definition_of, load_any, load_vehicle
+from railsim.definitions.loading import FORMATS, definition_of, load_any, load_track, load_vehicle
 from railsim.files import sources
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -83,3 +83,12 @@ def test_whole_files_in_the_manual_are_valid(page, tmp_path):
         path = tmp_path / "example.toml"
         path.write_text(block)
         load_any(path)
+
+
+@pytest.mark.parametrize(
+    ("flangeway", "fits"), [(0.04, True), ([[0.0, 0.06], [3.0, 0.04]], True), (0.3, False)]
+)
+def test_flangeway_is_one_width_or_rows_of_widths(flangeway, fits):
+    data = load_track("straight").model_dump(mode="json", exclude_none=True)
+    data["check_rail"] = [{"rail": "right", "flangeway": flangeway}]
+    assert validator_of("railsim-track/1").is_valid(data) == fits

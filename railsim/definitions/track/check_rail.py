@@ -8,6 +8,11 @@ from railsim.definitions import base
 
 MOST_CHECK_RAILS = 100
 Width = Annotated[base.Finite, Field(ge=0.02, le=0.2)]
+Rows = Annotated[
+    tuple[tuple[base.Finite, Width], ...],
+    Field(min_length=2, max_length=10_000),
+    base.rises("arc length"),
+]
 FAR = 1e7  # m
 
 
@@ -21,12 +26,7 @@ class CheckRail(base.Definition):
 
     rail: base.Side
     """Running rail beside which it stands; it holds the wheelset by the wheel on that rail"""
-    flangeway: Annotated[
-        tuple[tuple[base.Finite, Width], ...],
-        Field(min_length=2, max_length=10_000),
-        base.rises("arc length"),
-        BeforeValidator(_rows),
-    ]
+    flangeway: Annotated[Rows, BeforeValidator(_rows, json_schema_input_type=Width | Rows)]
     """Rows [s, width] from its begin to its end, linear in between, or one number for a check rail
     all along, as of grooved rails: from the gauge face of the running rail to its own face, both
     14 mm below the rail tops [m]"""
