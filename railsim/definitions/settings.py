@@ -13,7 +13,7 @@ from railsim.errors import Fault
 Step = Annotated[base.Finite, Field(ge=1e-6, le=0.1)]
 Rate = Annotated[base.Finite, Field(ge=1e-3, le=1e5)]
 Spacing = Annotated[base.Finite, Field(ge=1e-3, le=1e5)]
-Cells = Annotated[int, Field(strict=True, ge=1, le=500)]
+Cells = Annotated[int, Field(strict=True, ge=4, le=500)]
 Share = Annotated[base.Finite, Field(ge=0.0, le=1.0)]
 
 
@@ -136,7 +136,8 @@ class Settings(FileDefinition):
     output_spacing: Spacing | None = None
     """Distance between output points [m] instead of `output_rate`"""
     fastsim_grid: tuple[Cells, Cells] = (10, 10)
-    """Cells of a contact patch along and across"""
+    """Cells of a contact patch along and across; in full sliding 4 x 4 carry 5 % more than mu N,
+    10 x 10 0.7 %"""
     creep_law: CreepLawName = "fastsim"
     """Law of the creep forces; `table` is the full theory, tabulated"""
     laws: dict[base.Name, Law] | None = None

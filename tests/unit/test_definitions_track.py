@@ -397,7 +397,7 @@ def test_wrong_value_is_refused_for_it_alone(change):
         {"creep_law": "kalker"},
         {"step": 0.0},
         {"output_rate": -1.0},
-        {"fastsim_grid": [0, 10]},
+        {"fastsim_grid": [3, 10]},
         {"fastsim_grid": [10.5, 10]},
         {"poisson": 0.5},
         {"contact_damping": -1.0},

@@ -29,6 +29,17 @@ def test_no_friction_no_load_or_no_creepage_gives_zero(law, case):
     assert creep_force(**values, law=law) == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize(("cells", "beyond"), [(2, 0.24), (4, 0.048), (10, 0.0065)])
+def test_few_cells_carry_more_than_coulomb_friction(cells, beyond):
+    # midpoint sum of 8/pi (1 - x^2)(1 - y^2)^(3/2) over the cells by hand; settings begin with 4
+    y = (2.0 * np.arange(cells) + 1.0 - cells) / cells
+    along = np.mean(1.0 - y**2)
+    sum_of_bounds = 8.0 / np.pi * along * np.mean((1.0 - y**2) ** 1.5)
+    assert sum_of_bounds == pytest.approx(1.0 + beyond, abs=5e-4)
+    force = creep_force(**PATCH, xi_x=0.0, xi_y=1e2, phi=0.0, nx=cells, ny=cells)
+    assert force.T_y == pytest.approx(sum_of_bounds * MU * N, rel=1e-6)
+
+
 @laws
 @pytest.mark.parametrize("size", [1e2, 1e100])
 def test_huge_creepage_is_full_sliding(law, size):
