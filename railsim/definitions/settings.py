@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field
 
 from railsim.definitions import base
-from railsim.definitions.creep_law import CreepLawName
+from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.vehicle.laws import Law, LawUse, OwnOutput, with_sources
 from railsim.errors import Fault
@@ -182,6 +182,18 @@ class Settings(FileDefinition):
     def complete(cls, tables: dict[str, Any]) -> list[Fault]:
         """Put the sources of laws into the tables."""
         return with_sources(tables)
+
+    def unusual(self) -> list[base.Remark]:
+        """Return values beside which another takes their place."""
+        fields, found = type(self).model_fields, []
+        if self.output_spacing is not None and self.output_rate != fields["output_rate"].default:
+            found.append(
+                base.Remark("output_rate", "has no effect: output_spacing takes its place")
+            )
+        gridded = CREEP_LAWS[self.creep_law].grid and self.own_creep_law is None
+        if not gridded and self.fastsim_grid != fields["fastsim_grid"].default:
+            found.append(base.Remark("fastsim_grid", "has no effect: the creep law has no cells"))
+        return found
 
     @base.check
     def _physical(self) -> None:

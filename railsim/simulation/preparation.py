@@ -61,8 +61,8 @@ def prepare(
     balance, steps = _balanced(vehicle, track, settings, speed, profiles, on_judgement)
     model = balance.model
     step, _ = steps.at(speed)
-    unusual = [*vehicle_remarks(vehicle, model), *gauge_remarks(model.flat, track)]
-    unusual += narrow_remarks(model, track.gauge)
+    unusual = [*settings.unusual(), *vehicle_remarks(vehicle, model)]
+    unusual += [*gauge_remarks(model.flat, track), *narrow_remarks(model, track.gauge)]
     remarks: list[str] = [*balance.remarks, *map(str, unusual), *measured_remarks(track)]
     remarks += profile_remarks(model, profiles)
     if before is None:

@@ -419,6 +419,21 @@ def test_wrong_setting_is_refused_for_it_alone(change):
         assert error["loc"][:1] == tuple(change) or f"'{next(iter(change))}'" in error["msg"]
 
 
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"output_spacing": 0.5, "output_rate": 500.0}, ["output_rate"]),
+        ({"creep_law": "table", "fastsim_grid": [20, 20]}, ["fastsim_grid"]),
+        ({"creep_law": "fastrip", "fastsim_grid": [20, 20]}, []),
+        ({"output_spacing": 0.5, "creep_law": "polach"}, []),
+    ],
+)
+def test_setting_that_another_makes_useless_is_said(given, said):
+    remarks = Settings.model_validate(given).unusual()
+    assert [remark.key for remark in remarks] == said
+    assert all("has no effect: " in remark.text for remark in remarks)
+
+
 def test_settings_have_defaults_and_read_back():
     assert Settings().fastsim_grid == (10, 10)
     assert "fastsim_grid" in Settings().to_toml()
