@@ -71,7 +71,6 @@ def _is_number(text: str) -> bool:
 @cli.option("--out", "Folder.", "DIR", default="study")
 @cli.given_options()
 @cli.workers_option
-@cli.option("--together", "Without effect since 2026-11-28.", "N", cli.COUNT, hidden=True)
 @cli.scheduler_option
 @cli.flag("--resume", "Continue the study in DIR; compute what has changed.")
 @cli.option("--keep", "all; summary: no result files; or quantities: Q,Y.", "WHAT", default="all")
@@ -113,8 +112,6 @@ def command(
     """
     kept = {name: how.pop(name) for name in STORED}
     asked = {name: how.pop(name) for name in OF_FILE if name != "settings"}
-    if how.pop("together"):
-        output.remark("--together has no effect since 2026-11-28: it was no faster")
     where = {name: how[name] for name in ("workers", "scheduler")}
     campaign: Callable[..., int] = partial(_campaign, report=report, **where)
     if scenario is not None:

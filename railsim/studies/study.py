@@ -2,7 +2,6 @@
 
 import os
 import re
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain, count
 from pathlib import Path
@@ -44,7 +43,6 @@ def study(
     until: float | None = None,
     assignments: Sequence[str] = (),
     workers: int | None = None,
-    together: int | None = None,
     scheduler: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
@@ -88,8 +86,6 @@ def study(
         ``key.path=value`` for all runs.
     workers : int, optional
         Processes; by default one for each core.
-    together : int, optional
-        Without effect since 2026-11-28; warns.
     scheduler : str, optional
         Address of a dask scheduler whose workers carry out the runs instead.
     resume : bool
@@ -127,8 +123,6 @@ def study(
     ...     print([record["status"] for record in outcome.records])
     ['complete']
     """
-    if together is not None:
-        warnings.warn("`together` has no effect", DeprecationWarning, stacklevel=2)
     folder = Path(out)
     check_folder(folder)
     inputs = {

@@ -785,15 +785,6 @@ def test_workers_that_are_no_number_of_processes_are_refused(tmp_path, workers):
     assert not (tmp_path / "s").exists()
 
 
-def test_runs_in_one_call_are_an_option_without_effect(tmp_path, capsys):
-    arguments = ["--vehicles", COACH, "--tracks", "straight", "--speeds", "20", "--until", "2"]
-    out = ["--workers", "1", "--out", str(tmp_path / "s")]
-    assert main(["study", *arguments, *out, "--together", "8"]) == 0
-    assert "remark: --together has no effect" in capsys.readouterr().err
-    with pytest.warns(DeprecationWarning, match="no effect"):
-        railsim.study(COACH, "straight", 20.0, until=2.0, out=tmp_path / "s", together=8, workers=1)
-
-
 @pytest.mark.usefixtures("simulated")
 def test_an_assignment_of_a_key_that_varies_is_told(tmp_path):
     """`--set` beside `--grid` had no effect, in silence."""
