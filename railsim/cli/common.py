@@ -317,7 +317,9 @@ def given_options(settings: str = "", *, load: bool = True) -> Callable[[F], F]:
 def values_of(text: str, option: str) -> list[float]:
     """Return the values of ``A:B:N`` (N values from A to B) or ``A,B,C``; units may stand behind.
 
-    >>> values_of("10:20:3", "--speeds"), values_of("0.2,0.4", "--friction")
+    Each is returned once.
+
+    >>> values_of("10:20:3", "--speeds"), values_of("0.2,0.4,0.2", "--friction")
     ([10.0, 15.0, 20.0], [0.2, 0.4])
     >>> values_of("36:72:2 km/h", "--speeds"), values_of("36km/h,20", "--speeds")
     ([10.0, 20.0], [10.0, 20.0])
@@ -336,7 +338,7 @@ def values_of(text: str, option: str) -> list[float]:
         raise input_error(option, f"found '{text}'", allowed) from None
     if not all(abs(value) < float("inf") for value in values):
         raise input_error(option, f"found '{text}'", "finite numbers")
-    return values
+    return list(dict.fromkeys(values))
 
 
 @dataclass
