@@ -26,7 +26,7 @@ from railsim.definitions.track.support import Support as SupportDefinition
 from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, Faults, ModelError, changed_faults, input_error
-from railsim.kernels.aligned import CACHE_LINE, aligned
+from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.state import N_SCALARS, contact_begin, internal_begin, velocity_begin
 from railsim.kernels.status import LAW_NOT_FINITE, NOT_FINITE, STATUS
@@ -298,8 +298,9 @@ def on_common_grid(tables: Sequence[ContactTable]) -> tuple[float, list[Floats]]
 
 def side_by_side(tables: Sequence[Floats]) -> Floats:
     """Contact tables as one array; a single one as it lies in memory (or on disk)."""
-    values = tables[0][None] if len(tables) == 1 else np.stack(tables)
-    if values.ctypes.data % CACHE_LINE:
+    if len(tables) > 1:
+        values = np.stack(tables, out=aligned_zeros((len(tables), *tables[0].shape)))
+    elif (values := tables[0][None]).ctypes.data % CACHE_LINE:
         values = aligned(values)
     values.setflags(write=False)  # as on disk
     return values

@@ -1,5 +1,7 @@
 """Eight numbers side by side: each lane has what the same formula gives for one number."""
 
+import tracemalloc
+
 import numba
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from railsim.kernels.lanes import (
     where_beyond,
 )
 from railsim.kernels.rotation import sine_cosine_lanes
+from railsim.model.assembly import side_by_side
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="what is compiled is tested")
 WIDTH = 11
@@ -176,3 +179,14 @@ def test_aligned_arrays_start_on_a_cache_line():
     empty = aligned_zeros((0, 3), np.int64)
     assert empty.shape == (0, 3)
     assert empty.dtype == np.int64
+
+
+def test_tables_of_two_rails_are_put_side_by_side_without_a_second_copy():
+    tables = [np.full((3, 100, 1000), float(k)) for k in range(2)]
+    tracemalloc.start()
+    both = side_by_side(tables)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert np.array_equal(both, np.stack(tables))
+    assert both.ctypes.data % CACHE_LINE == 0
+    assert peak < 1.1 * both.nbytes
