@@ -249,6 +249,23 @@ LONG = frozenset(
         "verification/test_non_elliptic.py::test_mirrored_contour_has_the_same_patch",
         "interface/test_interrupts.py::test_full_disk_leaves_nothing_and_is_told_in_a_line",
         "unit/test_kernels_without_compiler.py::test_a_run_is_the_same_without_compilation",
+        "interface/test_study.py::"
+        "test_script_without_a_guard_runs_once_and_nothing_of_the_folder_it_is_started_in",
+        "interface/test_plot.py::test_picture_has_the_format_of_its_ending[pdf]",
+        "interface/test_plot.py::test_radii_in_the_plan_stand_within_its_axes[1]",
+        "interface/test_plot.py::test_wheelsets_in_a_curve_are_drawn_over_the_whole_width[19.0]",
+        "unit/test_solutions.py::"
+        "test_tracks_of_other_curves_share_the_judgement_on_straight_track[other1-2]",
+        "unit/test_solutions.py::"
+        "test_tracks_of_other_curves_share_the_judgement_on_straight_track[other3-2]",
+        "verification/test_crossing_runs.py::"
+        "test_a_run_that_begins_on_the_crossing_is_that_of_one_from_before_it[39.3]",
+        "verification/test_derailment.py::"
+        "test_wheel_that_climbs_is_derailed_and_stands_on_its_flange[0.0]",
+        "verification/test_sensitivity.py::"
+        "test_derivatives_of_a_free_oscillation_are_the_closed_ones[forward]",
+        "properties/test_mechanism_scaling.py::"
+        "test_an_enlarged_mechanism_has_every_result_enlarged_by_its_unit[tilting_two_springs]",
     }
 )
 """Long tests, most of them beside others of the same thing; marked `further`."""
