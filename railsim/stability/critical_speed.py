@@ -264,16 +264,18 @@ def _linear(
 
 def _stable_again(prepared: LinearVehicle, lost: float, high: float) -> list[str]:
     """Remark where rest is stable above the speed at which it is not: the sway of a body hunts."""
-    speed = lost
-    while (speed := AGAIN * speed) < high:
-        above = loss_of_stability(prepared.linearised, speed, high)  # all modes count
-        if not above.already:
-            to = high if above.parameter is None else above.parameter
-            return [
-                f"rest is unstable from {lost:.4g} m/s on, but no longer at {speed:.4g} m/s: it is "
-                f"stable from there to {to:.4g} m/s"
-            ]
-    return []
+    at, before, speed = prepared.linearised, lost, AGAIN * lost
+    while speed < high and (above := loss_of_stability(at, speed, high)).already:  # by any mode
+        before, speed = speed, AGAIN * speed
+    if speed >= high:
+        return []
+    downwards = loss_of_stability(lambda x: at(before + speed - x), before, speed)
+    again = lost if downwards.parameter is None else before + speed - downwards.parameter
+    to = high if above.parameter is None else above.parameter
+    return [
+        f"rest is unstable from {lost:.4g} m/s on, but no longer above {again:.4g} m/s: it is "
+        f"stable from there to {to:.4g} m/s"
+    ]
 
 
 def _over_amplitude(prepared: LinearVehicle, low: float, high: float) -> OverAmplitude:

@@ -1,5 +1,6 @@
 """Non-linear critical speed: three methods on Cooperrider's bogie and on a coach."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -601,7 +602,11 @@ def test_a_vehicle_that_is_unstable_in_a_range_only_is_said_so():
     found = critical_speed(coach, RIGID, methods=("linear",), over_amplitude=False)
     assert found.linear.speed == pytest.approx(17.0, abs=0.2)
     (remark,) = [words for words in found.remarks if "no longer" in words]
-    assert "no longer at 41.39 m/s: it is stable" in remark
+    border, loss = map(float, re.findall(r"(?:above|to) (\d+\.?\d*) m/s", remark))
+    for speed, stable in ((border - 0.1, False), (border + 0.1, True), (loss - 0.1, True),
+                          (loss + 0.1, False)):  # fmt: skip
+        modes = railsim.modes(coach, RIGID, speed=speed)
+        assert bool(modes.least_damped.damping_ratio > 0.0) is stable
     settings = railsim.Settings(initial={"front.outer.wheelset": {"y": 5e-3}})
     run = railsim.simulate(coach, RIGID, speed=60.0, duration=16.0, settings=settings)
     y, time = run["wheelset_lateral"], run["time"]
