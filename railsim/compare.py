@@ -22,6 +22,7 @@ from railsim.table import Amount, Column, Table
 from railsim.text import in_words, printable, shortened
 
 BESIDE = 1e-6  # m, from ends of elements, at which the curvature may jump
+MOST_KEYS = 12  # of vehicles with different names
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 
 
@@ -84,19 +85,23 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
 
 
 def conditions(results: Mapping[str, Result]) -> dict[str, list[str]]:
-    """Return what results differ in beside their vehicles: the value of each in words, by key.
+    """Return what results differ in: the value of each in words, by key.
 
-    `speed` [m/s], `track`, its name, and the keys of the track file and of the settings, which
-    begin with `track.` and `settings.`; not what a run wrote.
+    `speed` [m/s]; `track` and `vehicle`, their names; the keys of the files of both and of the
+    settings, which begin with `track.`, `vehicle.` and `settings.`; not what a run wrote.  Of
+    vehicles with different names that differ in more than `MOST_KEYS`, the names alone.
     """
     each = list(results.values())
-    tracks = [result.track() for result in each]
-    on_track = differing(tracks)
+    tracks, vehicles = [one.track() for one in each], [one.vehicle() for one in each]
+    on_track, of_vehicle = differing(tracks), differing(vehicles)
     whole = {
         "speed": [f"{result.speed:.6g}" for result in each],
         "track": [track.name if on_track else "" for track in tracks],
+        "vehicle": [vehicle.name if of_vehicle else "" for vehicle in vehicles],
     }
     found = {key: words for key, words in whole.items() if len(set(words)) > 1}
+    if len(of_vehicle) <= MOST_KEYS or "vehicle" not in found:
+        found |= {f"vehicle.{key}": words for key, words in of_vehicle.items()}
     found |= {f"track.{key}": words for key, words in on_track.items()}
     of_settings = differing([result.settings() for result in each])
     kept = {key: words for key, words in of_settings.items() if not key.startswith("outputs.")}

@@ -31,8 +31,8 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
     """Print peaks and medians over full curves of results side by side.
 
     The others are compared with the first result; differences are those of magnitudes, and those
-    along the track where the plan is the same.  What differs in speed, track and settings stands
-    first.  With --out the table and pictures of the leading wheelset's quantities are written.
+    along the track where the plan is the same.  What differs in speed, vehicle, track and settings
+    stands first.  With --out the table, and pictures of the leading wheelset, are written.
 
     Of one STUDY, a folder, the runs that differ in nothing but the vehicle are compared with each
     other; of several, the runs of the same name.

@@ -149,6 +149,24 @@ def test_conditions_that_differ_are_said_and_those_alike_are_not(files, tmp_path
     assert head[1].split() == ["speed", "(m/s)", "20", "15"]
 
 
+def test_changed_keys_of_a_vehicle_are_said_with_their_values():
+    """Of another vehicle too, if they are few; of one that differs in all its parts, its name."""
+    base = example_result()
+
+    def other(vehicle):
+        return {"base": base, "other": changed(base, {"vehicle_toml": vehicle.to_toml()})}
+
+    assignments = ["primary.stiffness.x=16e6", "load=laden"]
+    found = conditions(other(railsim.load_vehicle("coach_manchester", assignments)))
+    primary = "vehicle.assemblies.bogie.assemblies.axle.elements.primary.stiffness"
+    assert found[primary] == ["31391000, 884665, 936340", "16000000, 884665, 936340"]
+    assert found["vehicle.load"] == ["none", "laden"]
+    assert len(found) == 2
+    softer = railsim.load_vehicle("coach_manchester", [*assignments, "name=softer"])
+    assert conditions(other(softer)) == {"vehicle": [base.vehicle().name, "softer"], **found}
+    assert list(conditions(other(railsim.load_vehicle("coach_25t")))) == ["vehicle"]
+
+
 def test_command_prints_value_wheel_time_and_difference(files, capsys):
     assert main(["compare", *files]) == 0
     printed = capsys.readouterr().out
