@@ -1,7 +1,9 @@
 """Designs of an optimisation: values of the variables, evaluated by a study."""
 
+import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,8 @@ from railsim.studies.spec import Execution, StudySpec
 from railsim.studies.study import run_study
 from railsim.studies.summary import summary_row, unit_of
 
+_LOG = logging.getLogger(__name__)
+_MAGNITUDE = re.compile(r"\w+_(?:peak|mid\d*|median\d*)(?:_20hz)?")
 DIGITS = 6  # of the values of variables, more where the range is narrow
 INPUTS = "optimise.toml"
 
@@ -102,7 +106,10 @@ class Evaluation:
         outcome = run_study(spec, self.folder, replace(self._execution, progress=progress))
         self._execution = replace(self._execution, resume=True, overwrite=False)
         self.computed += outcome.computed
-        _check_quantities(self.wanted, outcome)
+        rows = _complete_rows(outcome)
+        _check_quantities(self.wanted, rows)
+        for text in () if self.designs else _sign_remarks(self.wanted, rows):
+            (self._execution.on_remark or _LOG.warning)(text)
         runs: dict[tuple[str, ...], list[Record]] = {row: [] for row in self.rows}
         for record in outcome.records:
             runs[tuple(str(record["labels"][path]) for path, _ in self.variables)].append(record)
@@ -212,13 +219,32 @@ def _scale(one: Constraint, excess: Sequence[float]) -> float:
     return max((abs(x) for x in excess if not math.isnan(x)), default=0.0) or 1.0
 
 
-def _check_quantities(wanted: Optimise, outcome: Outcome) -> None:
-    """Refuse a quantity that no complete run has."""
-    rows = [
+def _complete_rows(outcome: Outcome) -> Rows:
+    return [
         (record["labels"], summary_row(record))
         for record in outcome.records
         if record["status"] == "complete"
     ]
+
+
+def _sign_remarks(wanted: Optimise, rows: Rows) -> Iterator[str]:
+    """Yield what counts with its sign although its column is one of largest magnitudes.
+
+    The sign is a direction, which turns with the curve: a large negative value is not a small one.
+    """
+    for one in (*wanted.objectives, *wanted.constraints):
+        both = isinstance(one, Constraint) and None not in (one.low, one.high)
+        if both or one.magnitude or not _MAGNITUDE.fullmatch(one.quantity):
+            continue
+        if any(value < 0.0 for value in _values(one, rows)):
+            yield (
+                f"{name_of(one)} has negative values: the sign of the largest magnitude is its "
+                "direction; with `magnitude = true` its size counts"
+            )
+
+
+def _check_quantities(wanted: Optimise, rows: Rows) -> None:
+    """Refuse a quantity that no complete run has."""
     if not rows:
         return
     known = {name for _, cells in rows for name, v in cells.items() if isinstance(v, int | float)}

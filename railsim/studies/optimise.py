@@ -17,9 +17,10 @@ import numpy as np
 import tomli_w
 
 from railsim.definitions import Vehicle
-from railsim.definitions.loading import load_study
+from railsim.definitions.loading import load_study, load_vehicle
 from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Optimise
+from railsim.definitions.units_of_keys import unit_of_key
 from railsim.design_checks import NEAR_BOUND
 from railsim.errors import argument_error, input_error
 from railsim.files import sources
@@ -66,6 +67,7 @@ class Optimisation:
     - `sensitivities`: sensitivities of all objectives and constraints
     - `vehicles`: files of the chosen design
     - `computed`: number of runs that were computed by this call
+    - `units`: units of the variables by their paths, empty where the file format says none
     """
 
     folder: Path
@@ -77,13 +79,14 @@ class Optimisation:
     sensitivities: tuple[Sensitivity, ...]
     vehicles: tuple[Path, ...]
     computed: int
+    units: Mapping[str, str]
 
     def table(self) -> Table:
         """Return all designs with variables, objectives and constraints [SI]."""
         values = values_by_name(self.definition, self.designs)
         on_front = {design.number for design in self.front}
         variables = [
-            Column(path, path.removeprefix("vehicle."), format=".5g")
+            Column(path, path.removeprefix("vehicle."), self.units[path], ".5g")
             for path in self.definition.variables
         ]
         columns = [Column("design", format="d"), *variables]
@@ -100,10 +103,11 @@ class Optimisation:
         if self.chosen is None:
             reasons = {design.reason for design in self.designs if design.reason}
             why = f": {sorted(reasons)[0]}" if reasons else ""
-            words = f"none of {len(self.designs)} designs keeps all constraints{why}"
+            number = f"none of {len(self.designs)} designs"
             known = [design for design in self.designs if math.isfinite(design.excess)]
             if not known:
-                return [words]
+                return [f"{number} has values{why}"]
+            words = f"{number} keeps all constraints{why}"
             nearest = min(known, key=lambda design: design.excess)
             return [words, "", self._shown([nearest], nearest, "nearest")]
         shown = [*self.front[:: max(1, math.ceil(len(self.front) / MOST_ROWS))]]
@@ -256,12 +260,14 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
             raise argument_error("choose", f"design {choose}", f"1 to {len(designs)}")
         chosen = designs[choose - 1]
     about = evaluation.folder, wanted, designs, tuple(front), chosen
+    units = _units(evaluation.definition, wanted)
     found = Optimisation(
         *about,
-        _active(wanted, chosen, designs) if chosen else (),
+        _active(wanted, chosen, designs, units) if chosen else (),
         tuple(_sensitivities(evaluation, chosen)) if chosen else (),
         tuple(export_vehicles(evaluation, chosen)) if chosen else (),
         evaluation.computed,
+        units,
     )
     _write(found, evaluation.definition.name)
     return found
@@ -278,7 +284,16 @@ def _sensitivities(evaluation: Evaluation, chosen: Design) -> Sequence[Sensitivi
     return sensitivities(shares, columns, middle, list(wanted.variables), list(values))
 
 
-def _active(wanted: Optimise, chosen: Design, designs: Sequence[Design]) -> tuple[str, ...]:
+def _units(definition: Study, wanted: Optimise) -> dict[str, str]:
+    """Return the units of the variables by their paths, those of the first vehicle."""
+    overrides = split_overrides(definition.assignments)["vehicle"]
+    vehicle = load_vehicle(definition.vehicles[0], overrides)
+    return {path: unit_of_key(vehicle, path.removeprefix("vehicle.")) for path in wanted.variables}
+
+
+def _active(
+    wanted: Optimise, chosen: Design, designs: Sequence[Design], units: Mapping[str, str]
+) -> tuple[str, ...]:
     """Return the bounds and limits that a design reaches, limits of 0 by the range of `designs`."""
     found = []
     for path, variable in wanted.variables.items():
@@ -288,7 +303,7 @@ def _active(wanted: Optimise, chosen: Design, designs: Sequence[Design]) -> tupl
             ("upper", 1.0 - share, variable.high),
         ):
             if distance <= NEAR_BOUND:
-                found.append(f"{path} at its {words} bound, {bound:.12g}")
+                found.append(f"{path} at its {words} bound, {bound:.12g} {units[path]}".rstrip())
     number = len(wanted.constraints)
     known = np.array([one.constraints for one in designs if not math.isnan(sum(one.constraints))])
     ranges = np.ptp(known, axis=0) if len(known) else np.zeros(number)

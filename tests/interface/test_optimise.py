@@ -42,6 +42,7 @@ high = 0.9
 """
 VEHICLE = 'format = "railsim-vehicle/1"\nname = "mine"\nextends = "coach_manchester"\n'
 X = "vehicle.primary.stiffness.x"
+UNITS = {X: "N/m"}
 HUNTING = '[analyses.hunting]\nkind = "critical_speed"\n'
 DAMPER = "vehicle.secondary_vertical_damper.damping"
 
@@ -81,7 +82,7 @@ def test_front_choice_and_files(found):
     with open(optimised.folder / "designs.csv", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert [row["front"] for row in rows] == ["1"] * 6
-    assert {"curve.T_gamma (N)", "curve.attack (rad)", X} <= set(rows[0])
+    assert {"curve.T_gamma (N)", "curve.attack (rad)", f"{X} (N/m)"} <= set(rows[0])
     assert (optimised.folder / "front.png").stat().st_size > 5000
     wear = optimised.sensitivities[0]
     assert wear.low[X] < optimised.chosen.objectives[0] < wear.high[X]
@@ -358,8 +359,8 @@ def test_bounds_and_limits_are_told_with_all_their_digits():
         }
     )
     chosen = Design(1, {X: 31391234.0}, (1234567.0,), (1234567.0,), feasible=True)
-    assert _active(wanted, chosen, [chosen]) == (
-        f"{X} at its lower bound, 31391234",
+    assert _active(wanted, chosen, [chosen], UNITS) == (
+        f"{X} at its lower bound, 31391234 N/m",
         "curve.T_gamma at its upper limit, 1234567.5 N",
     )
 
@@ -375,7 +376,7 @@ def test_bounds_count_as_reached_within_2_per_cent_of_the_range(share, reached, 
         }
     )
     chosen = Design(1, {X: value}, (0.0,), (), feasible=True)
-    assert bool(_active(wanted, chosen, [chosen])) is reached
+    assert bool(_active(wanted, chosen, [chosen], UNITS)) is reached
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e6])
@@ -389,7 +390,7 @@ def test_a_limit_of_0_counts_as_reached_within_2_per_cent_of_the_range_of_the_de
     known = {"variables": variables, "objectives": objectives, "constraints": [limit]}
     values = np.array([-0.7, -share, 0.3, np.nan]) * unit
     designs = [Design(1, {X: 0.5}, (value,), (value,), feasible=True) for value in values]
-    found = _active(Optimise.model_validate(known), designs[1], designs)
+    found = _active(Optimise.model_validate(known), designs[1], designs, UNITS)
     assert found == (("curve.y at its upper limit, 0",) if reached else ())
 
 
@@ -417,6 +418,36 @@ def test_excess_over_a_limit_of_0_does_not_depend_on_the_unit(tmp_path, monkeypa
     assert evaluation(np.array([[0.4]])).constraints[3] == pytest.approx([-3.0, 0.6])
     assert [design.feasible for design in evaluation.designs] == [False, True, False, False]
     assert [design.excess for design in evaluation.designs] == pytest.approx([1.0, 0.0, 0.2, 0.6])
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("", True),
+        ("magnitude = true", False),
+        ('where = { track = "left" }', True),
+        ('where = { track = "right" }', False),
+    ],
+)
+def test_a_sign_that_is_a_direction_is_said_to_count(tmp_path, monkeypatch, asked, said):
+    """Of the sum of Y in curves to the left and to the right; not between two limits."""
+    text = STUDY.replace('"curve.T_gamma"', f'"sum_Y_peak"\n{asked}')
+    text = text.replace("curve.Y_over_Q", "sum_Y_peak").replace("high = 0.9", "low = -6\nhigh = 6")
+    study = load_study(written(tmp_path, text.replace("curve.attack", "curve.change")))
+    records = [
+        {"labels": {X: "1", "track": track}, "status": "complete", "sum_Y_peak": value,
+         "curve.change": -1.0}
+        for track, value in (("left", -5.0), ("right", 2.0))
+    ]  # fmt: skip
+    outcome = SimpleNamespace(records=records, computed=2)
+    monkeypatch.setattr(DESIGNS, "run_study", lambda *_: outcome)
+    monkeypatch.setattr(DESIGNS, "summary_row", lambda record: record)
+    monkeypatch.setattr(DESIGNS, "_written", lambda *_: "1")
+    remarks = []
+    evaluation = Evaluation(study, study.optimise, tmp_path, Execution(on_remark=remarks.append))
+    for _ in range(2):  # once, not for each batch
+        evaluation(np.array([[0.0]]))
+    assert ["has negative values" in words for words in remarks] == [True] * said
 
 
 def test_a_study_says_that_it_does_not_optimise(tmp_path, capsys):
