@@ -1,5 +1,7 @@
 """Types of arrays, and where in them something is."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,19 @@ def first_largest(values: Floats) -> tuple[int, ...]:
     """
     near = np.isclose(values, np.fmax.reduce(values, axis=None), rtol=EQUAL, atol=0.0)
     return tuple(int(k) for k in np.unravel_index(np.argmax(near), np.shape(values)))
+
+
+def largest_first(values: Sequence[float | None]) -> list[int]:
+    """Indices of the values that are there, the largest first; of equal ones the first.
+
+    Where none is positive the smallest come first: of unloaded wheels the most unloaded one.
+
+    >>> largest_first([1.0, None, -2.0, 3.0]), largest_first([-0.1, -0.4, None, 0.0])
+    ([3, 0, 2], [1, 0, 3])
+    """
+    there = [(value, k) for k, value in enumerate(values) if value is not None]
+    sign = -1.0 if any(value > 0.0 for value, _ in there) else 1.0
+    return [k for _, k in sorted((sign * value, k) for value, k in there)]
 
 
 def stretches(flags: Flags) -> list[tuple[int, int]]:

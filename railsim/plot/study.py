@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from railsim.arrays import Flags, Floats
+from railsim.arrays import Flags, Floats, largest_first
 from railsim.plot.style import DISTINCT, LIMIT, Picture, grid_of, note, styled
 from railsim.text import unformatted
 
@@ -181,8 +181,8 @@ def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure
     figure = Picture(9.8, len(quantities) * (0.9 + 0.2 * max(most, 2)))
     grid = figure.subplots(len(quantities), 1, squeeze=False)
     for axes, quantity in zip(grid[:, 0], quantities, strict=True):
-        pairs = [(v, n) for v, n in zip(quantity.values, names, strict=True) if v is not None]
-        shown = sorted(pairs, key=lambda pair: -pair[0])[:MOST_RANKED]
+        order = largest_first(quantity.values)
+        shown = [(quantity.values[k], names[k]) for k in order[:MOST_RANKED]]
         names_shown = [n if len(n) <= LONGEST else f"...{n[3 - LONGEST :]}" for _, n in shown]
         lengths, labels = [v for v, _ in shown], [*map(unformatted, names_shown)]
         bars = axes.barh(labels, lengths, color=DISTINCT[0], height=0.7)
@@ -190,8 +190,8 @@ def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure
         axes.invert_yaxis()
         axes.margins(x=0.1, y=0.02)
         axes.tick_params(axis="y", labelsize=7)
-        left_out = len(pairs) - len(shown)
-        more = f", the largest {len(shown)} of {len(pairs)}" if left_out else ""
+        left_out = len(order) - len(shown)
+        more = f", the largest {len(shown)} of {len(order)}" if left_out else ""
         axes.set_title(quantity.words + more)
     return figure
 

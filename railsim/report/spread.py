@@ -7,6 +7,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from railsim.arrays import largest_first
 from railsim.definitions.study.analyses import unit_of_number
 from railsim.files.key_paths import AXES, telling_end
 from railsim.notation import DECIMALS, QUANTITIES, Quantity
@@ -18,7 +19,8 @@ Record = Mapping[str, Any]
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 LEAST = 3  # runs, for a spread
 WORST = 5  # runs of each quantity
-RANKED = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")  # worst runs, pictures
+RANKED = ("dQ_over_Q0_max", "dQ_over_Q0_min", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
+"""Quantities of the worst runs, and of pictures by default."""
 
 
 def parameters(
@@ -182,7 +184,7 @@ def worst_rows(
     for key in [name for name in RANKED if name in there] or own:
         column = there[key]
         row: list[tuple[str, str] | str] = [_heading(column)]
-        for number in _ranked(column["values"])[:WORST]:
+        for number in largest_first(column["values"])[:WORST]:
             told = (
                 f"{own['words']} {_text(own['values'][number])} {own['unit']}".rstrip()
                 for own in varied.values()
@@ -217,13 +219,7 @@ def worst_runs(records: Sequence[Record], most: int) -> list[str]:
     if len(names) <= most:
         return names
     there = columns(records)
-    ranked = [_ranked(there[name]["values"]) for name in RANKED if name in there]
+    ranked = [largest_first(there[name]["values"]) for name in RANKED if name in there]
     in_turn = dict.fromkeys(number for rank in zip_longest(*ranked) for number in rank)
     in_turn.pop(None, None)
     return [names[number] for number in sorted([*in_turn][:most] or range(most))]
-
-
-def _ranked(values: Sequence[float | None]) -> list[int]:
-    """Numbers of the runs with a value, the largest first."""
-    there = [(-value, number) for number, value in enumerate(values) if value is not None]
-    return [number for _, number in sorted(there)]

@@ -345,7 +345,9 @@ def test_values_are_told_in_words():
     assert rails["track.rail"]["values"] == ["60E1", "54E1"]  # not 600 and 540
     rows = worst_rows([{**r, "labels": {"speed": 20.0 + i}} for i, r in enumerate(records(7))])
     values = [[float(value) for value, _ in row[1:]] for row in rows]
-    assert all(row == sorted(row, reverse=True) and len(row) == 5 for row in values)
+    assert all(row == sorted(row, key=abs, reverse=True) and len(row) == 5 for row in values)
+    assert "smallest" in str(rows[1][0])  # of the wheel load: the most unloaded wheel first
+    assert values[1][0] < values[1][-1] < 0.0
 
 
 @pytest.mark.parametrize(("count", "words"), [(1, "1 row: 0, 1"), (2, "2 rows: 0, 1; 0, 1")])
