@@ -6,9 +6,9 @@ r = |F+ - F-| / |F+ + F-| above the tolerance asks for a shorter step, at most a
 does not fall with the step the output has a kink (flange, stop, lifted wheel, sticking friction),
 and a derivative means nothing: said so.
 
-The accuracy reported of a central difference is the difference to that of the step before, where
-there is one, else r^2 (the next term of a series whose terms fall geometrically), and rounding at
-least; of a forward difference it is r, from one more run with all parameters changed at once.
+The accuracy reported of a central difference is the difference to that of another step, where there
+is one, else r^2 (the next term of a series whose terms fall geometrically), and rounding at least;
+of a forward difference it is r, from one more run with all parameters changed at once.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -296,6 +296,8 @@ def _central(job: _Job, base: list[Floats], pool: Workers) -> tuple[list[list[De
                 new, ratio = _one(y, above[k], below[k], step, before)
                 if before is None or new.error < before.error:
                     found[k, j] = new
+                else:  # with what it does not agree with
+                    found[k, j] = replace(before, error=new.error)
                 shorter |= ratio > TOLERANCE and not ratio > KINK * ratios[k, j]
                 ratios[k, j] = ratio
             again += [j] if shorter else []

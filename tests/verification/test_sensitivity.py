@@ -1,5 +1,7 @@
 """Derivatives of runs: closed forms on a rig of one mode, decay rates of the linear analysis."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from dynamics import load_track
@@ -7,6 +9,7 @@ from test_fixed_bodies import hanging, rig
 
 import railsim
 from railsim.definitions.settings import Settings
+from railsim.identification.derivatives import _central
 
 pytestmark = pytest.mark.usefixtures("small_contact_tables_in_module")  # the anchor is fixed
 STRAIGHT = load_track("straight")
@@ -104,6 +107,19 @@ def test_a_stop_is_said_to_have_no_derivative():
     )  # fmt: skip
     assert not found.derivatives[force, STIFF].is_smooth
     assert "no derivative" in found.remarks[0]
+
+
+def test_the_error_is_what_two_steps_differ_by():
+    """x + 3 x^2 + 1e-4 sin(2 pi x / 0.01): the first step, 0.01, does not see the ripple."""
+
+    def variants(points, _):
+        return [[x + 3.0 * x**2 + 1e-4 * np.sin(2.0 * np.pi * x / 0.01)] for x in points]
+
+    job = SimpleNamespace(parameters=["x"], variants=variants)
+    (((found,),), runs) = _central(job, [np.zeros(1)], None)
+    assert runs == 5
+    exact = 1.0 + 2e-4 * np.pi / 0.01
+    assert found.error == pytest.approx(abs(exact - found.value[0]) / exact, rel=0.2)
 
 
 @pytest.mark.parametrize(
