@@ -117,6 +117,9 @@ class Optimisation:
         parts: list[str | Table] = [number, "", self._shown(shown, self.chosen, "chosen"), ""]
         parts += [f"remark: {self.chosen.remark}"] * bool(self.chosen.remark)
         parts += [f"active (within {NEAR_BOUND:.0%}): {words}" for words in self.active]
+        unknown = sum(map(math.isnan, (sum(design.values) for design in self.designs)))
+        if unknown and self.sensitivities:
+            parts.append(f"without the {unknown} designs that have no values:")
         parts += [one.sentence() for one in self.sensitivities]
         return [*parts, *map(str, self.vehicles), str(self.folder / "front.png")]
 

@@ -3,6 +3,7 @@
 import csv
 import json
 from contextlib import nullcontext as nothing
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -448,6 +449,16 @@ def test_a_sign_that_is_a_direction_is_said_to_count(tmp_path, monkeypatch, aske
     for _ in range(2):  # once, not for each batch
         evaluation(np.array([[0.0]]))
     assert ["has negative values" in words for words in remarks] == [True] * said
+
+
+@pytest.mark.parametrize("unknown", [0, 2])
+def test_designs_without_values_are_said_to_be_left_out_of_the_sensitivities(found, unknown):
+    optimised, _ = found
+    lost = [
+        Design(7 + k, {X: 1e7}, (np.nan,) * 2, (np.nan,), feasible=False) for k in range(unknown)
+    ]
+    words = list(map(str, replace(optimised, designs=(*optimised.designs, *lost)).parts()))
+    assert ("without the 2 designs that have no values:" in words) == bool(unknown)
 
 
 def test_a_study_says_that_it_does_not_optimise(tmp_path, capsys):
