@@ -72,7 +72,8 @@ def page(
     peaks = any(record["name"] in results for record in _done(records))
     used = inputs_of(records, every) or list(used)
     units = units_of(records, used[:MOST_UNITS])
-    sections = [_peaks(records, results)] if peaks or len(records) < spread.LEAST else []
+    few, analysed = len(records) < spread.LEAST, any(map(_own_values, records))
+    sections = [_peaks(records, results)] if peaks or (few and not analysed) else []
     sections += [_assessed(one) for one in assessments if one.standard not in RUNNING]
     if len(_done(records)) > max(spread.LEAST, len(results)):
         sections.append(_worst(records, units))
@@ -80,7 +81,7 @@ def page(
         sections.append(_curves(len(data["curves"]), records, results))
     if limits.tables or limits.details:
         sections.append(limits)
-    if len(records) >= spread.LEAST:
+    if analysed or not few:
         sections.append(_spread(records, data, inputs, units))
     sections += [*_published(every), *measured]
     sections.append(what_was_run(used, every, inputs))
@@ -98,8 +99,13 @@ def page(
     )  # fmt: skip
 
 
+def _own_values(record: Record) -> Any:
+    """Values of analyses and of functions of the user."""
+    return record.get("quantities")
+
+
 def _done(records: Sequence[Record]) -> list[Record]:
-    return [record for record in records if record.get("peaks")]
+    return [record for record in records if record.get("peaks") or _own_values(record)]
 
 
 def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
@@ -176,7 +182,9 @@ def _worst(records: Sequence[Record], units: Mapping[str, str]) -> doc.Section:
         f"The largest of {len(done)} runs by magnitude, over all wheels; the table of runs below "
         "has the rest, and the command of each."
     )
-    return doc.Section("Worst runs", [text], tables=[table], id="worst")
+    # of a critical speed the largest value is no bad one
+    title = "Worst runs" if any(one.get("peaks") for one in done) else "Largest values"
+    return doc.Section(title, [text], tables=[table], id="worst")
 
 
 def _largest(shown: int, done: int) -> str:

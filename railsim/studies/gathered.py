@@ -129,7 +129,7 @@ def _add(
             continue
         if record.get("file") and (folder / record["file"]).is_file():
             found.paths[name] = folder / record["file"]
-        else:
+        elif "peaks" in record:  # an analysis alone has no file
             missing += 1
     if missing:
         found.remarks.append(

@@ -334,6 +334,21 @@ def test_study_without_results_tells_its_inputs_once_and_its_worst_runs(tmp_path
     assert main(given) == 0
 
 
+@pytest.mark.parametrize("number", [2, 4])
+def test_values_of_analyses_alone_are_shown_however_few(number):
+    """They have no peaks and no files."""
+    runs = [
+        {"name": f"run{k}", "file": "", "labels": {"speed": 20.0 + k}, "status": "complete",
+         "quantities": {"hunting.linear": 80.0 - k}}
+        for k in range(number)
+    ]  # fmt: skip
+    text = page("t", runs, {})
+    assert "No run has values" not in text
+    assert '"values":[80.0,79.0' in re.sub(r"\s", "", text)
+    assert ("Largest values" in text) == ("Spread over 4 runs" in text) == (number == 4)
+    assert "Worst runs" not in text
+
+
 def test_values_are_told_in_words():
     assert day("2026-11-03T15:04:20+00:00") == "3 November 2026, 15:04"
     assert in_words(((10, 10), None, True)) == "10, 10, none, yes"
