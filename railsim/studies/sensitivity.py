@@ -12,6 +12,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.studies.search import Surrogate
 
+DOUBTFUL = 0.05  # share of the variance that a surrogate misses, from which it is said
 SAMPLES = 1024  # a power of two, times the number of variables and two
 
 
@@ -38,7 +39,10 @@ class Sensitivity:
         """Return the variables by their shares of the variance, the largest first."""
         shares = sorted(self.total.items(), key=lambda item: -item[1])
         words = ", ".join(f"{p.removeprefix('vehicle.')} {100.0 * s:.0f} %" for p, s in shares)
-        words += f" (surrogate's error {100.0 * self.error:.0f} %)"
+        missed = min(1.0, self.error**2)  # share of the variance; one variable explains all of it
+        said = missed > DOUBTFUL and len(shares) > 1
+        doubt = f"; shares uncertain by {100.0 * missed:.0f} %" * said
+        words += f" (surrogate's error {100.0 * self.error:.0f} %{doubt})"
         if not any(self.total.values()):
             words = "none of the variables; it is the same in all designs"
         return f"{self.quantity} depends on: {words}"

@@ -6,7 +6,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial.distance import cdist
 
 from railsim.studies.search import METHODS, Surrogate, Task, Values, knee, non_dominated
-from railsim.studies.sensitivity import sensitivities
+from railsim.studies.sensitivity import Sensitivity, sensitivities
 
 
 def zdt1(x):
@@ -195,6 +195,18 @@ def test_total_indices_of_a_product_hold_its_interaction_and_errors_are_root_mea
     share = np.outer(side, side).ravel()
     deviation = np.sqrt(share @ (z - share @ z) ** 2)
     assert found.error == pytest.approx(np.sqrt(share @ np.square(missed)) / deviation, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("error", "names", "doubt"),
+    [(0.22, "ab", ""), (0.5, "ab", "25 %"), (3.0, "ab", "100 %"), (0.5, "a", "")],
+)
+def test_shares_of_the_variance_are_as_uncertain_as_what_the_surrogate_misses(error, names, doubt):
+    """1 - R^2 of it, the mean square of its errors over the variance."""
+    shares = dict.fromkeys(names, 1.0 / len(names))
+    words = Sensitivity("z", shares, shares, shares, shares, error).sentence()
+    end = f"; shares uncertain by {doubt})" if doubt else f"error {100.0 * error:.0f} %)"
+    assert words.endswith(end)
 
 
 def test_knee_counts_distances_over_the_range_of_the_front_wherever_it_lies():
