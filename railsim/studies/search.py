@@ -262,6 +262,7 @@ def _differential_evolution(task: Task) -> None:
         init=np.random.default_rng(task.seed).random((size, task.variables)),
         seed=task.seed,
         tol=0.0,
+        atol=-1.0,  # no end before: equal values of all members, or none, are no optimum
         polish=False,
         updating="deferred",
         vectorized=True,

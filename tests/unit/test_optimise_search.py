@@ -98,6 +98,19 @@ def test_a_search_goes_on_where_designs_have_no_answer():
     assert np.isnan(values[:, 0]).mean() < 0.3
 
 
+@pytest.mark.parametrize("plateau", [np.nan, 1.0])
+def test_evolution_goes_on_where_all_members_have_the_same_value_or_none(plateau):
+    """As where no design of the first generation hunts, or all of them derail."""
+
+    def hole(x):
+        return np.where(sphere(x) > 0.01, plateau, sphere(x))
+
+    values, designs = searched(hole, "differential_evolution", number=400, batch=8)
+    assert (hole(designs[:8]) == plateau).all() or np.isnan(hole(designs[:8])).all()
+    assert len(designs) == 400
+    assert np.nanmin(values) < 0.01
+
+
 def test_same_seed_same_designs():
     _, one = searched(zdt1, "surrogate", number=24)
     _, same = searched(zdt1, "surrogate", number=24)
