@@ -143,6 +143,23 @@ async function probe(frame) {
 }
 """
 
+TINTS = """
+async function probe(frame) {
+  const d = frame.contentWindow.document, box = d.querySelector('[data-plots="spread"]');
+  const [view, value] = box.querySelectorAll("select"), event = () => new Event("change");
+  view.value = 1;
+  value.value = Array.from(value.options).find(o => /, smallest/.test(o.textContent)).value;
+  value.dispatchEvent(event());
+  const all = name => Array.from(box.querySelectorAll(name));
+  return {
+    ends: all(".scale span").map(e => Number(e.textContent)),
+    cells: all("svg text.cell").map(e => Number(e.textContent)),
+    fills: all("svg rect").map(e => e.style.fill),
+    strong: getComputedStyle(all(".scale i")[0]).backgroundImage.match(/rgb[^)]*\\)/g)[1],
+  };
+}
+"""
+
 
 # What is read on paper: the names of the runs, and no table beyond the edge.
 PAPER = """
@@ -306,6 +323,19 @@ def test_study_without_results_has_table_curves_map_and_parallel_coordinates(tmp
         assert values == sorted(values, reverse=True)
         assert [row[0] for row in found["failed"]] == ["run5"]
         assert found["told"].startswith("no equilibrium — railsim run coach1 curve --speed 15")
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no chromium")
+def test_the_most_unloaded_wheel_has_the_strongest_colour_of_a_map(tmp_path):
+    runs = []
+    for i, record in enumerate(records(4)):
+        labels = {**record["labels"], "speed": 10.0 + i % 2, "vehicle": f"coach{i // 2}"}
+        runs.append({**record, "name": f"run{i}", "labels": labels})
+    for found in probed(tmp_path, page("A study", runs, {}), TINTS):
+        cells = found["cells"]
+        assert found["ends"] == pytest.approx([max(cells), min(cells)], abs=0.01)
+        assert found["fills"][cells.index(min(cells))] == found["strong"]
+        assert len(set(found["fills"])) == len(cells) == 4
 
 
 def test_study_without_results_tells_its_inputs_once_and_its_worst_runs(tmp_path, simulated):

@@ -4,7 +4,7 @@ window.railsimStudy = function (data, tools) {
   "use strict";
   var made = tools.made, shown = tools.shown, choose = tools.choose;
   var names = Object.keys(data.parameters), keys = Object.keys(data.columns), total = data.runs.length;
-  var CLASSES = 24, BINS = 8, PRINCIPAL = ["dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "Y_abs", "T_gamma_abs"];
+  var CLASSES = 24, BINS = 8, PRINCIPAL = ["dQ_over_Q0_max", "dQ_over_Q0_min", "Y_over_Q_abs", "sum_Y_abs", "Y_abs", "T_gamma_abs"];
   /* values of analyses and of functions of the user have names of their own */
   var principal = keys.filter(function (k) { return PRINCIPAL.indexOf(k) >= 0 || !/_(abs|max|min|mid\d+)$/.test(k); });
 
@@ -31,7 +31,7 @@ window.railsimStudy = function (data, tools) {
     var m = g.length >> 1;
     return g.length % 2 ? g[m] : 0.5 * (g[m - 1] + g[m]);
   }
-  function share(v, low, high) { return high > low ? (v - low) / (high - low) : 0.5; }
+  function share(v, low, high) { return high !== low ? (v - low) / (high - low) : 0.5; }
   function rgb(name) { return [1, 3, 5].map(function (i) { return parseInt(tools.colour(name).slice(i, i + 2), 16); }); }
   function tint(s) {
     var low = rgb("--k4"), high = rgb("--bad");
@@ -48,6 +48,9 @@ window.railsimStudy = function (data, tools) {
     var found = values.filter(function (v) { return v !== null; });
     return [Math.min.apply(null, found), Math.max.apply(null, found)];
   }
+  function least(value) { return /, smallest$/.test(value.words); }
+  /* Values of the faint and of the strong end of the colours: of unloading the smallest is strong. */
+  function tints(value, values) { return least(value) ? extent(values).reverse() : extent(values); }
   function scale(box, low, high) {
     var line = made("p", box, undefined, "notes scale");
     made("span", line, shown(low));
@@ -104,9 +107,9 @@ window.railsimStudy = function (data, tools) {
     var x = parameter(over), y = parameter(beside), across = classes(x, CLASSES), up = classes(y, CLASSES);
     var cells = up.labels.map(function () { return across.labels.map(function () { return []; }); });
     value.values.forEach(function (v, r) { if (v !== null) { cells[up.of(y.values[r])][across.of(x.values[r])].push(v); } });
-    var least = /, smallest$/.test(value.words), worse = least ? Math.min : Math.max;
+    var worse = least(value) ? Math.min : Math.max;
     var worst = cells.map(function (row) { return row.map(function (g) { return g.length ? worse.apply(null, g) : null; }); });
-    var ends = extent([].concat.apply([], worst)), n = across.labels.length, m = up.labels.length;
+    var ends = tints(value, [].concat.apply([], worst)), n = across.labels.length, m = up.labels.length;
     var W = 900, left = 150, wide = (W - left) / n, high = Math.min(44, Math.max(18, 360 / m)), H = m * high + 74, above = 20;
     var picture = svg("svg", made("div", box, undefined, "scroll"), { viewBox: "0 0 " + W + " " + H, class: "study" });
     worst.forEach(function (row, j) {
@@ -126,13 +129,13 @@ window.railsimStudy = function (data, tools) {
     svg("text", picture, { x: left + 0.5 * (W - left), y: above + m * high + 42, "text-anchor": "middle" }, words(x));
     svg("text", picture, { x: 4, y: 12 }, words(y));
     scale(box, ends[0], ends[1]);
-    return "Colour: " + (least ? "smallest " : "largest ") + words(value) + " of all runs of a cell; empty cells have no run.";
+    return "Colour: " + (least(value) ? "smallest " : "largest ") + words(value) + " of all runs of a cell; empty cells have no run.";
   }
 
   /* parallel coordinates ---------------------------------------------------------------------- */
   function parallel(box, value) {
     var axes = names.slice(0, 7).map(function (_, k) { return parameter(k); }).concat([value]);
-    var W = 900, H = 320, top = 40, bottom = 24, step = (W - 160) / Math.max(1, axes.length - 1), ends = extent(value.values);
+    var W = 900, H = 320, top = 40, bottom = 24, step = (W - 160) / Math.max(1, axes.length - 1), ends = tints(value, value.values);
     var picture = svg("svg", made("div", box, undefined, "scroll"), { viewBox: "0 0 " + W + " " + H, class: "study" });
     var marks = []; /* written over the lines */
     var places = axes.map(function (c, k) {
