@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.constants import FASTEST
 from railsim.contact.gauges import wheel_gauge
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.base import Remark, kept
@@ -58,8 +59,6 @@ LAG = 1.0
 """Damping over series stiffness of a damper [s]: 0.3 s at most, of yaw dampers."""
 SPRING_LOAD = (0.6, 1.5)
 """Static load of a spring over the load at which its length was measured."""
-FASTEST = 125.0
-"""Admissible speed [m/s]: trains reach 100 m/s in service."""
 SPRING_TRAVEL = 0.7
 """Static compression of a spring over its free length, coils on each other."""
 

@@ -101,6 +101,41 @@ def test_contradicting_track_is_refused(plan, cant, expected):
             "the gradient steps",
         ),
         ([STRAIGHT], [], {"support": {"pad_vertical": [80.0, 60.0]}}, "a stiffness of 80 N/m"),
+        (
+            [STRAIGHT],
+            [],
+            {"support": {"variation": [[10.0, 140e6], [20.0, 70e6]]}},
+            "support.variation: a factor of 1.4e+08; rows hold factors",
+        ),
+        (
+            [STRAIGHT],
+            [],
+            {"support": {"preset": "slab", "variation": [[10.0, 1.0, 1.0], [20.0, 1.0, 0.2]]}},
+            "support.variation: the factors of ballast have no effect",
+        ),
+        ([STRAIGHT], [], {"speed": 160.0}, "speed: 160 m/s are 576 km/h"),
+        # 2 x 20 mm over 100 mm
+        (
+            [STRAIGHT],
+            [],
+            {
+                "irregularities": [
+                    {**DIP, "s": 20.0, "length": 0.1, "depth": 0.02, "shape": "triangle"}
+                ]
+            },
+            "irregularities.0: 400 mm/m steep",
+        ),
+        (
+            [STRAIGHT],
+            [],
+            {
+                "check_rail": [
+                    {"rail": "left", "flangeway": [[begin, 0.05], [begin + 20.0, 0.05]]}
+                    for begin in (5.0, 15.0)
+                ]
+            },
+            "check_rail.1: from 15 to 25 m beside check_rail.0: their forces add up",
+        ),
         ([STRAIGHT], [], {"friction": 4.0}, "friction: a coefficient of 4 is beyond"),
         ([STRAIGHT], [], {"friction": [0.4, 1.1]}, "friction: a coefficient of 1.1 is beyond"),
         ([STRAIGHT], [], {"friction_table": [[0.0, 0.3], [9.0, 3.0]]}, "friction_table: a coeff"),
@@ -156,6 +191,23 @@ def test_unusual_track_is_remarked_on(plan, cant, more, expected):
     assert track_faults(unusual) == []
     remarks = [str(remark) for remark in track_remarks(unusual)]
     assert any(expected in remark for remark in remarks), remarks
+
+
+def test_usual_supports_dips_and_check_rails_are_not_remarked_on():
+    """A hanging sleeper, stiffer pads, a dipped joint, check rails on both sides."""
+    rows = [[10.0, 1.0, 1.0], [10.6, 1.0, 0.01], [11.2, 2.0, 1.0]]
+    flangeways = [("left", 5.0), ("right", 5.0), ("left", 25.0)]
+    usual = track(
+        [STRAIGHT],
+        support={"preset": "co-running", "variation": rows},
+        irregularities=[{**DIP, "s": 20.0, "length": 2.0, "depth": 0.02}],
+        check_rail=[
+            {"rail": rail, "flangeway": [[begin, 0.05], [begin + 20.0, 0.05]]}
+            for rail, begin in flangeways
+        ],
+        speed=97.0,
+    )
+    assert track_remarks(usual) == []
 
 
 def test_a_radius_of_5_m_is_the_smallest():

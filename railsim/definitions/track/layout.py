@@ -9,11 +9,15 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from railsim.constants import CANT_BASE, NORMAL_GAUGE, WIDENED
+import numpy as np
+
+from railsim.constants import CANT_BASE, FASTEST, NORMAL_GAUGE, WIDENED
 from railsim.definitions.base import Remark
 from railsim.definitions.excitations.measured import Measured
+from railsim.definitions.excitations.single import Single
 from railsim.definitions.track.alignment_rules import alignment_remarks, cant_at, corners
 from railsim.definitions.track.elements import Section, TrackElement
+from railsim.definitions.track.support import Support
 from railsim.errors import Fault
 
 if TYPE_CHECKING:
@@ -28,6 +32,10 @@ ASTRAY_CANT = 1e-3
 MOST_FRICTION = 1.0
 # Stiffness of a support that is remarked on [N/m]: under 50 kN it would yield by 50 mm.
 SOFTEST = 1e6
+# Factors of a support: a hanging sleeper is a hundred times as soft, a bridge ten times as stiff.
+FACTORS = 1e-2, 1e2
+# Slope of a single disturbance that is remarked on [1]: dipped joints have 0.02.
+STEEPEST = 0.2
 # Difference of mileage that is remarked on [m].
 SAME_MILEAGE = 0.5
 # Smallest cant that counts as cant, smallest difference of length that counts [m].
@@ -107,11 +115,10 @@ def track_remarks(track: "Track") -> list[Remark]:
         remarks.append(Remark(key, f"{text} {MOST_FRICTION:g}"))
     if track.friction_table and track.friction != type(track).model_fields["friction"].default:
         remarks.append(Remark("friction", "has no effect: friction_table takes its place"))
-    for name in ("pad_vertical", "pad_lateral", "ballast_vertical", "ballast_lateral"):
-        spring = getattr(track.support, name)
-        if spring is not None and spring[0] < SOFTEST:
-            text = f"a stiffness of {spring[0]:g} N/m; railways have 1e7 to 1e9 N/m"
-            remarks.append(Remark(f"support.{name}", text))
+    remarks += [*_supports(track.support), *_check_rails_at_once(track), *_slopes(track)]
+    if track.speed is not None and track.speed > FASTEST:
+        text = f"{track.speed:g} m/s are {3.6 * track.speed:.0f} km/h: is the speed in m/s?"
+        remarks.append(Remark("speed", text))
     if track.speed is not None and abs(track.gauge - NORMAL_GAUGE) <= WIDENED:
         remarks += alignment_remarks(plan, cant, vertical, track.speed)
     for section in (*plan, *cant, *vertical):
@@ -142,6 +149,46 @@ def track_remarks(track: "Track") -> list[Remark]:
                 text += f"; is it a mileage? shift = {to:.9g} puts its begin at s = {at:g}"
             remarks.append(Remark(key, text))
     return [*remarks, *_mileages(track)]
+
+
+def _supports(support: Support) -> Iterator[Remark]:
+    """Remark on stiffnesses and factors in other units, and on a ballast that is not there."""
+    for name in ("pad_vertical", "pad_lateral", "ballast_vertical", "ballast_lateral"):
+        spring = getattr(support, name)
+        if spring is not None and spring[0] < SOFTEST:
+            text = f"a stiffness of {spring[0]:g} N/m; railways have 1e7 to 1e9 N/m"
+            yield Remark(f"support.{name}", text)
+    rows = support.variation or ()
+    odd = [factor for row in rows for factor in row[1:] if not FACTORS[0] <= factor <= FACTORS[1]]
+    if odd:
+        text = f"a factor of {odd[0]:g}; rows hold factors of the support's own stiffness, about 1"
+        yield Remark("support.variation", text)
+    values = support.values
+    if values and not values.has_sleeper and any(ballast != pads for _, pads, ballast in rows):
+        text = f"the factors of ballast have no effect: preset '{support.preset}' has none"
+        yield Remark("support.variation", text)
+
+
+def _check_rails_at_once(track: "Track") -> Iterator[Remark]:
+    """Remark on check rails beside the same rail at the same place."""
+    for k, part in enumerate(track.check_rail):
+        for i, one in enumerate(track.check_rail[:k]):
+            begin = max(part.rows[0][0], one.rows[0][0])
+            end = min(part.rows[-1][0], one.rows[-1][0])
+            if part.rail == one.rail and begin < end:
+                text = f"from {begin:g} to {end:g} m beside check_rail.{i}: their forces add up"
+                yield Remark(f"check_rail.{k}", text)
+
+
+def _slopes(track: "Track") -> Iterator[Remark]:
+    """Remark on single disturbances that no wheel can follow."""
+    for k, shape in enumerate(track.irregularities):
+        if isinstance(shape, Single):
+            s = np.linspace(*shape.extent(track.length), 101)
+            steepest = float(np.abs(shape.displacement(track.length)(s)[1]).max())
+            if steepest > STEEPEST:
+                text = f"{1e3 * steepest:.0f} mm/m steep: are its length and height in m?"
+                yield Remark(f"irregularities.{k}", text)
 
 
 def _not_reached(sections: Sequence[Section], rounding: float) -> Iterator[Remark]:
