@@ -87,7 +87,9 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
                 hunts=hunts,
                 uneven=uneven,
                 irregular=irregular,
+                varying=len(support.variation) > 1,
                 struck=bool(model.check.check.size),
+                centred=_centred(extremes),
                 slides=bool(model.system.track.rail[:, 4:, 0].any()),  # of both rails, in its cells
             ),
             elastic=bool(support.elastic),
@@ -167,11 +169,16 @@ def lifted_wheels(
     )
 
 
+def _centred(extremes: Mapping[str, Floats]) -> bool:
+    """Whether no wheelset has left the middle of the track."""
+    return bool(np.max(np.abs(extremes["wheelset_lateral"])) < UNDISTURBED)
+
+
 def stability(swings: Hunting | None, extremes: Mapping[str, Floats], duration: float) -> str:
     """Remark on a vehicle that hunts, or that nothing has disturbed laterally in the run [s]."""
     if swings is not None:
         return swings.sentence
-    if duration < LONG or not np.max(np.abs(extremes["wheelset_lateral"])) < UNDISTURBED:
+    if duration < LONG or not _centred(extremes):
         return ""
     return (
         "Nothing disturbs the vehicle laterally: its wheelsets stay in the middle of the track, "
@@ -303,13 +310,16 @@ def vibration_cause(
     hunts: bool = False,
     uneven: bool = False,
     irregular: bool = False,
+    varying: bool = False,
     struck: bool = False,
+    centred: bool = False,
     slides: bool = True,
 ) -> str:
     """What wheel loads vibrate from, in words.
 
-    `hunts`: the vehicle; `uneven`: wheels are not round; `irregular`: the rails; `struck`: there
-    are check rails, whose blow or friction may be the cause; `slides`: there is friction.
+    `hunts`: the vehicle; `uneven`: wheels are not round; `irregular`: the rails; `varying`: their
+    support; `struck`: there are check rails, whose blow or friction may be the cause; `centred`: no
+    wheelset leaves the middle of the track; `slides`: there is friction.
     """
     if hunts:
         return "the vehicle hunts"
@@ -317,6 +327,10 @@ def vibration_cause(
         return "excited by wheels that are not round"
     if irregular:
         return "excited by the irregularities or sections of the rails"
+    if varying:
+        return "excited by the support of the rails, which varies along the track"
+    if centred:
+        return "excited by the gradient, by applied forces or by the start, on smooth rails"
     if not slides:
         by = "a check rail or " if struck else ""
         return f"excited by {by}blows of the flanges, on smooth rails without friction"

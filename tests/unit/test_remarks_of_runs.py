@@ -96,6 +96,8 @@ def test_peaks_of_a_run_that_ends_before_they_are_to_count_are_told():
         ({}, "by sliding friction"),
         ({"struck": True}, "by a check rail, or sliding friction"),
         ({"hunts": True}, "hunts"),
+        ({"centred": True}, "excited by the gradient, by applied forces or by the start"),
+        ({"varying": True}, "excited by the support of the rails, which varies"),
         ({"slides": False}, "excited by blows of the flanges, on smooth rails without friction"),
         ({"slides": False, "struck": True}, "excited by a check rail or blows of the flanges"),
     ],
