@@ -7,6 +7,8 @@ rails: the wheelsets would climb or fall.  Therefore the vehicle runs in:
   starting position over a transition, and keeps them until the vehicle has settled; the state at
   its end, relative to the track frames, is the initial state; or, if requested, the initial state
   is the steady state found by Newton's method;
+- on a straight gradient, or where the support of the rails varies, it is in the steady state there,
+  by Newton's method;
 - into a transition, a ramp, a vertical curve or a range of changing rail sections over the real
   track, from the last position before it where the track under the vehicle is uniform, since its
   state depends on the twist, or the rails, passed;
@@ -141,14 +143,15 @@ def _guided(system: System, check: CheckRails) -> System:
 
 
 def _standing(model: Model, balance: Equilibrium, track: Track, s: float) -> Equilibrium:
-    """Return the balance on rails supported as at `s`: softer ones are pressed down further."""
-    if not len(model.system.support.variation):
+    """Return the balance on the gradient at `s`, and on rails supported as there."""
+    if not (len(model.system.support.variation) or _gradient(track, s)):
         return balance
-    system = _supported(model.system, s)._replace(track=track_tables(circle(track)))
+    there = _inclined(circle(track), track, s)
+    system = _supported(model.system, s)._replace(track=track_tables(there))
     speed = float(balance.state[SPEED])
     try:
         state = SteadyRolling(model, system).solve(placed(balance.state), speed)
-    except NotConverged:  # the rails settle as the run begins
+    except NotConverged:  # vehicle and rails settle as the run begins
         return balance
     state[-3:] = balance.state[-3:]
     return replace(balance, state=state)
@@ -298,6 +301,19 @@ def _curve(track: Track, s: float) -> tuple[float, float]:
     )
 
 
+def _gradient(track: Track, s: float) -> float:
+    """Gradient at `s`, 0 where negligible."""
+    gradient = float(alignment_of(track).gradient(s))
+    return gradient if abs(gradient) >= NEGLIGIBLE else 0.0
+
+
+def _inclined(level: Track, track: Track, s: float) -> Track:
+    """Return a level track on the gradient that another one has at `s`."""
+    gradient = _gradient(track, s)
+    slope = [{"type": "CST", "length": level.length, "gradient": gradient}]
+    return level.replace(vertical=slope) if gradient else level
+
+
 def _steady(
     model: Model, balance: Equilibrium, track: Track, start: float, remark: Callable[[str], None]
 ) -> Floats | None:
@@ -318,7 +334,7 @@ def _steady(
 
     def along(share: float) -> tuple[System, float]:
         part = circle(track, curvature=share * curvature, cant=share * cant, friction=friction)
-        return level._replace(track=track_tables(part)), speed
+        return level._replace(track=track_tables(_inclined(part, track, start))), speed
 
     try:
         state = led(model, along, placed(balance.state))[0]
@@ -350,6 +366,7 @@ def settled(
     auxiliary = curve_to_settle_in(
         model, track, speed, curvature, cant, _friction(track, start), TIMES
     )
+    auxiliary = _inclined(auxiliary, track, start)
     there = without_loads(model.system)
     if len(rows := there.support.variation):
         everywhere = np.array([[start, *(np.interp(start, rows[:, 0], f) for f in rows.T[1:])]])

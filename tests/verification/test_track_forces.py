@@ -79,6 +79,33 @@ def test_crest_takes_and_sag_gives_the_load_of_m_v2_over_r(coach, sign):
     assert lost == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.parametrize("slope", [0.04, -0.04])
+def test_run_begins_on_a_gradient_as_it_goes_on(coach, slope):
+    """Sum of Q = m g cos(theta); the force that holds the speed has its share in single loads."""
+    profile = track(vertical=[{"type": "CST", "length": 1000.0, "gradient": slope}])
+    result = simulate(coach, profile, speed=20.0, start=100.0, duration=2.0)
+    mass, _ = masses(coach)
+    total = result.Q.sum(axis=(1, 2))
+    np.testing.assert_allclose(total, mass * G * np.cos(np.arctan(slope)), rtol=1e-6)
+    np.testing.assert_allclose(result.Q, result.Q[:1].repeat(len(total), axis=0), atol=5.0)
+    # the leading wheelset has more load uphill, and the last one downhill
+    assert np.diff(result.Q[0, [0, -1], 0]) * slope < 0.0
+
+
+def test_run_begins_in_a_curve_on_a_gradient_with_the_load_there(coach):
+    """Sum of Q = m cos(theta) (g cos(phi) + V^2/R sin(phi)); the level one is 0.18 % more."""
+    slope, radius, cant = 0.06, 500.0, 0.1
+    level = [{"type": "CST", "length": 350.0, "gradient": slope}]
+    result = simulate(
+        coach, curve(radius, cant, vertical=level), speed=20.0, start=200.0, until=240
+    )
+    mass, _ = masses(coach)
+    phi = np.arcsin(cant / 1.5)
+    expected = mass * (G * np.cos(phi) + 20.0**2 / radius * np.sin(phi))
+    total = result.Q.sum(axis=(1, 2))
+    np.testing.assert_allclose(total, expected * np.cos(np.arctan(slope)), rtol=1e-4)
+
+
 def test_free_coach_rolls_down_a_gradient_less_its_resistance(coach):
     """V' = (m g sin(theta) - W - W_c) / (m + sum(I/r0^2)), once the jerk of the start has died.
 
