@@ -49,10 +49,11 @@ class UnevenWheels(NamedTuple):
                 found[side] = [np.interp(angle, nodes, x, period=turn) for x in values.T]
         return found
 
-    def longest_step(self, speed: float, *, elastic: bool) -> float:
-        """Longest step that resolves the waves around the wheels, on elastic or rigid rails [s]."""
+    def longest_step(self, speed: float, of_rails: float, *, elastic: bool) -> float:
+        """Longest step that resolves waves of the wheels and of elastic or rigid rails [m], [s]."""
         steps = PER_LENGTH if elastic else PER_WAVE
-        return float(min(self.surface_row[:, WAVE], default=np.inf)) / (steps * speed)
+        shortest = float(min(self.surface_row[:, WAVE], default=np.inf))
+        return min(shortest, of_rails) / (steps * speed)
 
 
 ROUND = UnevenWheels(

@@ -38,6 +38,7 @@ from railsim.model.time_step import Situation, Stability
 from railsim.model.work import level_track_with_friction, uneven_rigid_rails
 from railsim.simulation.auxiliary_track import Progress
 from railsim.simulation.flange import at_rest_beside, in_flange_contact
+from railsim.track.irregularity import shortest_wave
 
 CLASS = 1.2  # ratio of the speeds of a class
 # part of the output interval by which a given step may miss an integer fraction: six digits
@@ -88,6 +89,7 @@ class StepChoice:
         self._states = states
         lightest = model.system.bodies.mass[model.system.contact.body].min()
         guided = check_rail_step(model.check.check, float(lightest))
+        self._wave = shortest_wave(track)
         self._followed = min(braked_step(model.system), guided)
         self.varies = settings.drive.mode != "constant"
         self.smallest = math.inf
@@ -102,7 +104,7 @@ class StepChoice:
         self._known[key] = longest
         if self._settings.step is None:
             elastic = bool(self._model.system.support.elastic)
-            waves = self._model.wheels.longest_step(speed, elastic=elastic)
+            waves = self._model.wheels.longest_step(speed, self._wave, elastic=elastic)
             longest = min(longest, waves, self._followed)
         longest = min(longest, *self._periods, longest)
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))

@@ -10,9 +10,10 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions import Track
-from railsim.definitions.excitations.base import Displacement
+from railsim.definitions.excitations.base import Displacement, Irregular
 from railsim.definitions.excitations.law import ByLaw
 from railsim.definitions.excitations.measured import RECORDED, Measured, largest_between_rows
+from railsim.definitions.excitations.single import Single
 from railsim.definitions.track.elements import Section
 from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.track.rounded_profile import RoundedProfile
@@ -26,6 +27,8 @@ BEYOND_ROWS = 1.05
 CANTED, LONG, TWICE = 0.02, 30.0, 0.5  # m, m, 1
 VERSINE = 0.01  # m; mean alignment in a curve that is doubtful
 SMALLEST, ROUGHNESS = 1e-4, 0.1  # m; of a recording, and distance of the rows of rougher rails
+MOST_ROWS = 500_000  # that tables follow, of a record as long as the track: 250 MB
+SHORT = 0.4  # m; waves that steps resolve however low they are
 LARGEST = 0.5  # m; of a law of one's own
 
 
@@ -77,8 +80,27 @@ def _by_law(part: ByLaw, key: str, track: Track) -> Displacement:
 
 
 def shortest_length(track: Track) -> float:
-    """Length that the tables must resolve: a sixteenth of the shortest wave, and so on [m]."""
-    return min([np.inf, *(part.resolution() for part in track.irregularities)])
+    """Length that the tables must resolve: a sixteenth of the shortest wave, and so on [m].
+
+    Of records no more than a share of the track, `MOST_ROWS`: there is a remark.
+    """
+    return min((_resolved(part, track) for part in track.irregularities), default=np.inf)
+
+
+def shortest_wave(track: Track) -> float:
+    """Shortest wave of the rails that goes on, of records and such like [m].
+
+    Infinite from `SHORT` on: where such waves or single disturbances are high, steps are divided.
+    """
+    parts = [part for part in track.irregularities if not isinstance(part, Single)]
+    shortest = 16.0 * min((_resolved(part, track) for part in parts), default=np.inf)
+    return shortest if shortest < SHORT else np.inf
+
+
+def _resolved(part: Irregular, track: Track) -> float:
+    """Length that tables resolve of an irregularity [m]."""
+    least = track.length / MOST_ROWS if isinstance(part, Measured) else 0.0
+    return max(part.resolution(), least)
 
 
 def measured_remarks(track: Track) -> list[str]:
@@ -99,6 +121,11 @@ def measured_remarks(track: Track) -> list[str]:
                 f"the largest row is {1e3 * at_rows:.3g} mm."
             )
         remarks += _size_remarks(part, index) + _gap_remarks(part, index)
+        if (cell := track.length / MOST_ROWS) > part.resolution():
+            remarks.append(
+                f"irregularities.{index} has rows closer than a track of {track.length:g} m is "
+                f"resolved: waves below {4e3 * cell:.3g} mm are not followed; a shorter track does."
+            )
         remarks += _held_remarks(part, index, track)
     ends = [
         part.extent(track.length)

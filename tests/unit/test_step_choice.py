@@ -150,12 +150,13 @@ def test_steps_divide_the_output_interval_and_the_periods_of_controllers(
 ):
     """Outputs every 5 ms; 2 ms would be stable, or the step that is given."""
     steps = step_choice.StepChoice.__new__(step_choice.StepChoice)
-    wheels = SimpleNamespace(longest_step=lambda speed, elastic: math.inf)
+    wheels = SimpleNamespace(longest_step=lambda speed, of_rails, elastic: math.inf)
     system = SimpleNamespace(support=SimpleNamespace(elastic=True))
     steps._settings = Settings(output_rate=200.0, step=given)
     steps._model = SimpleNamespace(wheels=wheels, system=system)
     steps._known, steps._periods = {20.0: given or 2e-3}, periods
     steps._followed, steps.varies, steps.smallest = braked, False, math.inf
+    steps._wave = math.inf
     step, every = steps.at(20.0)
     assert (step, every) == (pytest.approx(5e-3 / count), count)
     assert steps.smallest == step

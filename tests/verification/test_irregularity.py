@@ -12,7 +12,12 @@ from railsim.definitions.excitations.spectra import ERRI_B176, SPECTRA
 from railsim.definitions.loading import load_track
 from railsim.definitions.track.definition import Track
 from railsim.errors import InputError
-from railsim.track.irregularity import displacement, measured_remarks, shortest_length
+from railsim.track.irregularity import (
+    displacement,
+    measured_remarks,
+    shortest_length,
+    shortest_wave,
+)
 from railsim.track.tables import track_tables
 
 Y_LEFT, Z_LEFT, Y_RIGHT, Z_RIGHT, MU_LEFT, MU_RIGHT = range(6)
@@ -703,6 +708,51 @@ def test_missing_rows_are_remarked_on(tmp_path):
     for shift, words in ((5000.0, "5000 to 5090 m"), (-5000.0, "-5000 to -4910 m")):
         (remark,) = measured_remarks(recorded(tmp_path, written(s, z), shift=shift))
         assert remark.startswith(f"What is recorded goes from s = {words} of the 100 m")
+
+
+def corrugated(wave, distance, amplitude=2e-5, length=12.0, **more):
+    """A straight with waves of both rails, a row each `distance`, beside some level of 20 m."""
+    s = np.arange(0.0, length, distance)
+    z = amplitude * np.sin(2.0 * np.pi * s / wave) + 2e-3 * np.sin(2.0 * np.pi * s / 20.0)
+    rows = [
+        [at, 0.0, height, 0.0, height] for at, height in zip(s.tolist(), z.tolist(), strict=True)
+    ]
+    part = {"type": "measured", "rows": rows, "fade": 1.0}
+    plan = [{"type": "STR", "length": length}]
+    return load_track("straight").replace(plan=plan, cant=[], irregularities=[part], **more)
+
+
+@pytest.mark.parametrize(("wave", "distance"), [(0.03, 0.004), (0.06, 0.005), (0.1, 0.01)])
+def test_tables_follow_corrugation(wave, distance):
+    """Cubics of the cells against the sine, between rows too: 1 % of its amplitude."""
+    track = corrugated(wave, distance)
+    tables = track_tables(track)
+    s = np.linspace(3.0, 5.0, 1999)
+    cell, u = np.divmod(s - tables.s_start, tables.ds)
+    cubic = tables.rail[cell.astype(int), 1]
+    found = sum(cubic[:, k] * u**k for k in range(4))
+    exact = 2e-5 * np.sin(2.0 * np.pi * s / wave) + 2e-3 * np.sin(2.0 * np.pi * s / 20.0)
+    np.testing.assert_allclose(found, exact, atol=2.5e-7)
+    assert measured_remarks(track) == []
+
+
+def test_close_rows_without_short_waves_make_no_fine_tables():
+    assert shortest_length(corrugated(0.06, 0.005, amplitude=0.0)) == 0.05
+    assert shortest_wave(corrugated(0.06, 0.005, amplitude=0.0)) == np.inf
+    assert shortest_wave(corrugated(0.06, 0.005)) == pytest.approx(0.04)
+    # two rows 1 mm apart, as where records are put together
+    rows = [[s, 0.0, 1e-3 * (s == 5.0), 0.0, 0.0] for s in (0.0, 2.0, 4.0, 5.0, 5.001, 6.0, 8.0)]
+    part = {"type": "measured", "rows": rows}
+    assert shortest_length(load_track("straight").replace(irregularities=[part])) == 0.05
+
+
+def test_rows_too_close_for_the_length_of_the_track_are_remarked_on():
+    """20 km over 500 000 lengths of 40 mm each: four a wave."""
+    (remark, _) = measured_remarks(
+        corrugated(0.06, 0.005).replace(plan=[{"type": "STR", "length": 20e3}])
+    )
+    assert remark.startswith("irregularities.0 has rows closer than a track of 20000 m is resolved")
+    assert "waves below 160 mm are not followed" in remark
 
 
 def test_a_recording_smaller_than_any_track_is_remarked_on(tmp_path):

@@ -65,12 +65,12 @@ SOFT = {
 }
 
 
-def loaded_wheelset(contact_damping, **support):
-    """Model and state at rest of a wheelset under a mass on very soft springs."""
+def wheelset_with_load():
+    """A wheelset under a mass on very soft springs."""
     data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
     wheelset = data["assemblies"]["bogie"]["assemblies"]["axle"]["wheelsets"]["wheelset"]
     mass = 2.0 * (P0 / 9.81 - MU)
-    vehicle = Vehicle.model_validate(
+    return Vehicle.model_validate(
         {
             "format": "railsim-vehicle/1",
             "name": "loaded wheelset",
@@ -79,8 +79,12 @@ def loaded_wheelset(contact_damping, **support):
             "elements": {"spring": SOFT},
         }
     )
+
+
+def loaded_wheelset(contact_damping, **support):
+    """Model and state at rest of that wheelset."""
     balance = steady(
-        vehicle,
+        wheelset_with_load(),
         load_track("straight").replace(support=support),
         Settings(contact_damping=contact_damping),
         10.0,
@@ -263,6 +267,37 @@ def test_wheel_load_over_the_roughness_is_that_of_two_masses(frequency):
     track = 1.0 / (k - RAIL.rail_mass * omega**2 + 1j * omega * c)
     expected = 1.0 / abs(1.0 / hertz - 1.0 / (MU * omega**2) + track)
     assert abs(found) == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize(("preset", "wave", "distance"), [("p2", 0.1, 5e-3), ("slab", 0.05, 2e-3)])
+def test_corrugation_of_a_record_loads_the_wheel_as_its_wave(preset, wave, distance):
+    """|Q|/r as above at 207 and 414 Hz, 8 um high, by the step and the cells that are chosen."""
+    model, state = loaded_wheelset(0.0, preset=preset)
+    bounce = model.index.coordinate("wheelset", 0) + 2
+    loads = []
+    for e in (-1e-7, 1e-7):
+        lower = state.copy()
+        lower[bounce] += e
+        loads.append(evaluate(model.system, lower)[0].wheel[0, 0, W_Q])
+    hertz = (loads[1] - loads[0]) / 2e-7
+
+    speed, height, s = 20.7, 8e-6, np.arange(0.0, 12.0, distance)
+    z = height * np.sin(2.0 * np.pi * s / wave)
+    rows = [[at, 0.0, low, 0.0, low] for at, low in zip(s.tolist(), z.tolist(), strict=True)]
+    record = {"type": "measured", "rows": rows, "fade": 1.0}
+    plan = [{"type": "STR", "length": 12.0}]
+    track = on(preset, plan=plan, cant=[], irregularities=[record])
+    settings = Settings(contact_damping=0.0)
+    result = simulate(wheelset_with_load(), track, speed=speed, until=10.0, settings=settings)
+    omega, late = 2.0 * np.pi * speed / wave, result.distance > 5.0
+    time = result.time[late]
+    basis = np.column_stack([np.cos(omega * time), np.sin(omega * time), np.ones_like(time)])
+    cosine, sine, _ = np.linalg.lstsq(basis, result.Q[late, 0, 0], rcond=None)[0]
+
+    (k, c), mass = PRESETS[preset].pad_vertical, PRESETS[preset].rail_mass
+    rail = 1.0 / (k - mass * omega**2 + 1j * omega * c)
+    expected = height / abs(1.0 / hertz - 1.0 / (MU * omega**2) + rail)
+    assert np.hypot(cosine, sine) == pytest.approx(expected, rel=0.05)
 
 
 def test_reference_scheme_and_fast_one_agree_without_masses():
