@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -245,6 +246,26 @@ def into_curve(radius, cant, length, speed):
          {"type": "CST", "length": 90.0, "cant": cant}] if cant else [],
         speed=speed,
     )  # fmt: skip
+
+
+def test_a_half_wave_in_short_elements_is_one_transition():
+    """(1 - cos(pi x/L))/2 of curvature and cant: 120 m, elements of 2 m, rounded over 5 m."""
+    share = 0.5 - 0.5 * np.cos(np.pi * np.arange(61) / 60)
+    ends = [*zip(share[:-1].tolist(), share[1:].tolist(), strict=True)]
+    radii = [(1000.0 / a if a else math.inf, 1000.0 / b) for a, b in ends]
+    bend = [{**CLOTHOID, "length": 2.0, "radius_start": a, "radius_end": b} for a, b in radii]
+    rise = [{**RAMP, "length": 2.0, "cant_start": 0.1 * a, "cant_end": 0.1 * b} for a, b in ends]
+    plan = [STRAIGHT, *bend, {**CIRCLE, "radius": 1000.0}]
+    cant = [{**LEVEL, "length": 100.0}, *rise, {**CANTED, "length": 80.0}]
+    assert track_remarks(track(plan, cant, rounding=5.0, speed=30.0)) == []
+    # 100 mm of cant at 144 km/h ask for 80 m: of a shorter one there is one remark
+    short = [{**part, "length": 1.0} for part in bend], [{**part, "length": 1.0} for part in rise]
+    plan[1:-1], cant[1:-1] = short
+    remarks = map(str, track_remarks(track(plan, cant, rounding=5.0, speed=40.0)))
+    assert [text for text in remarks if "a transition of" in text] == [
+        "plan.1: a transition of 60 m is shorter than 80 m, "
+        "the largest of d V/180, I V/270 and 60 m"
+    ]
 
 
 NEAR = st.sampled_from([0.95, 1.05])  # of a limit

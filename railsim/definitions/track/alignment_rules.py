@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 
 from railsim.cant import cant_deficiency
 from railsim.definitions.base import Remark
-from railsim.definitions.track.elements import Section
+from railsim.definitions.track.elements import Section, joined
 
 HIGH_SPEED = 230.0  # km/h: the cant of high-speed lines from here on
 MOST_CANT, MOST_CANT_HIGH_SPEED = 160.0, 180.0  # mm
@@ -91,23 +91,28 @@ def _ramps(cant: Sequence[Section], speed: float) -> Iterator[Remark]:
 def _transitions(
     plan: Sequence[Section], cant: Sequence[Section], speed: float
 ) -> Iterator[Remark]:
-    for section in plan:
-        if section.type != "CLO":
-            continue
-        heights = [cant_at(cant, s) for s in (section.begin, section.end)]
-        values = (section.start_value, section.end_value)
-        ends = [1e3 * cant_deficiency(speed, k, h) for k, h in zip(values, heights, strict=True)]
-        change = abs(ends[1] - ends[0]) / section.length * speed
+    for section in (one for one in plan if one.type == "CLO"):
+        _, lack = _changes(section, cant, speed)
+        change = lack / section.length * speed
         if change > CHANGE * ROUND_OFF:
             beyond = ", and than 90" if change > CHANGE_EXCEPTIONAL * ROUND_OFF else ""
             text = f"the cant deficiency changes by {change:.0f} mm/s, more than {CHANGE:g}{beyond}"
             yield Remark(section.key, text)
-        V = 3.6 * speed
-        d = 1e3 * abs(heights[1] - heights[0])
-        needed = max(d * V / 180.0, abs(ends[1] - ends[0]) * V / 270.0, SHORTEST)
+    V = 3.6 * speed
+    for section in (one for one in joined(plan) if one.type == "CLO"):
+        d, lack = _changes(section, cant, speed)
+        needed = max(d * V / 180.0, lack * V / 270.0, SHORTEST)
         if section.length * ROUND_OFF < needed:
             text = f"a transition of {section.length:g} m is shorter than {needed:.0f} m"
             yield Remark(section.key, f"{text}, the largest of d V/180, I V/270 and 60 m")
+
+
+def _changes(section: Section, cant: Sequence[Section], speed: float) -> tuple[float, float]:
+    """Change of cant and of its deficiency from end to end [mm]."""
+    heights = [cant_at(cant, s) for s in (section.begin, section.end)]
+    values = (section.start_value, section.end_value)
+    ends = [cant_deficiency(speed, k, h) for k, h in zip(values, heights, strict=True)]
+    return 1e3 * abs(heights[1] - heights[0]), 1e3 * abs(ends[1] - ends[0])
 
 
 def _vertical_curves(vertical: Sequence[Section], speed: float) -> Iterator[Remark]:

@@ -1,6 +1,8 @@
 """Elements of the plan, the cant and the vertical profile: of a track file, and over arc length."""
 
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
@@ -140,3 +142,19 @@ class Section:
     def value(self, s: float) -> float:
         """Value at the arc length `s` within the section."""
         return self.start_value + self.slope * (s - self.begin)
+
+
+def joined(sections: Sequence[Section]) -> list[Section]:
+    """Return the sections with ramps that go on, but not from zero on, as one with its first key.
+
+    So one writes curvature or cant that is no straight line, such as a half-wave.
+    """
+    whole: list[Section] = []
+    for one in sections:
+        before = whole[-1] if whole else one
+        goes_on = before.slope * one.slope > 0.0 and abs(one.start_value) > 1e-9
+        if whole and goes_on and math.isclose(before.end_value, one.start_value, rel_tol=1e-6):
+            whole[-1] = replace(before, end=one.end, end_value=one.end_value)
+        else:
+            whole.append(one)
+    return whole

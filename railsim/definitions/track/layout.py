@@ -16,7 +16,7 @@ from railsim.definitions.base import Remark
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.single import Single
 from railsim.definitions.track.alignment_rules import alignment_remarks, cant_at, corners
-from railsim.definitions.track.elements import Section, TrackElement
+from railsim.definitions.track.elements import Section, TrackElement, joined
 from railsim.definitions.track.support import Support
 from railsim.errors import Fault
 
@@ -121,7 +121,7 @@ def track_remarks(track: "Track") -> list[Remark]:
         remarks.append(Remark("speed", text))
     if track.speed is not None and abs(track.gauge - NORMAL_GAUGE) <= WIDENED:
         remarks += alignment_remarks(plan, cant, vertical, track.speed)
-    for section in (*plan, *cant, *vertical):
+    for section in (*joined(plan), *joined(cant), *joined(vertical)):
         if section.slope != 0.0 and section.length < track.rounding - SMALL:
             text = (
                 f"the transition is shorter ({section.length:g} m) than the rounding "
