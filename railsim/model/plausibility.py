@@ -6,6 +6,7 @@ on their springs with the wheelsets held, and how the weight is shared by the su
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ from railsim.definitions.base import Remark, kept
 from railsim.definitions.elements.base import Element, FreeLength
 from railsim.definitions.elements.friction import SideBearer
 from railsim.definitions.elements.springs import BumpStop, SpringDamper
+from railsim.definitions.track.check_rail import CheckRail
 from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import ModelError, listed
@@ -139,6 +141,35 @@ def narrow_remarks(model: "Model", gauge: float) -> list[Remark]:
             )
             texts.setdefault(text, []).append(body.name)
     return [gathered(text, names) for text, names in texts.items()]
+
+
+def flangeway_remarks(model: "Model", track: Track) -> list[Remark]:
+    """Remark on flangeways narrower than a flange, and on two that leave the backs no room."""
+    texts: dict[str, list[str]] = {}
+    for body in model.flat.of_kind("wheelset"):
+        wheelset = body.wheelset
+        assert wheelset is not None
+        for k, part in enumerate(track.check_rail):
+            wheel = model.profiles[wheelset.profile[part.rail == "right"]]
+            width, thick = min(width for _, width in part.rows), wheel_gauge(wheel)[1]
+            text = f"a flange of {1e3 * thick:.1f} mm in the flangeway of check_rail.{k}, "
+            if width < thick:
+                texts.setdefault(f"{text}{1e3 * width:.1f} mm", []).append(body.name)
+        for (i, a), (k, b) in combinations(enumerate(track.check_rail), 2):
+            apart = track.gauge - _narrowest(a, b)
+            text = f"{1e3 * wheelset.back_to_back:.1f} mm between its backs, the faces of "
+            text += f"check_rail.{i} and {k} are {1e3 * apart:.1f} mm apart: it wedges on them"
+            if a.rail != b.rail and apart > wheelset.back_to_back:
+                texts.setdefault(text, []).append(body.name)
+    return [gathered(text, names) for text, names in texts.items()]
+
+
+def _narrowest(a: CheckRail, b: CheckRail) -> float:
+    """Least sum of two flangeways where both are [m]; infinite where they are nowhere together."""
+    (s_a, of_a), (s_b, of_b) = (np.transpose(part.rows) for part in (a, b))
+    s = np.union1d(s_a, s_b)
+    s = s[(s >= max(s_a[0], s_b[0])) & (s <= min(s_a[-1], s_b[-1]))]
+    return float(np.min(np.interp(s, s_a, of_a) + np.interp(s, s_b, of_b), initial=np.inf))
 
 
 def profile_remarks(model: "Model", given: Iterable[str] | None = None) -> tuple[str, ...]:

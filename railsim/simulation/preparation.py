@@ -17,6 +17,7 @@ from railsim.model.assembly import Model, assemble
 from railsim.model.control import periods, with_control
 from railsim.model.equilibrium import Equilibrium, stored_equilibrium
 from railsim.model.plausibility import (
+    flangeway_remarks,
     gauge_remarks,
     narrow_remarks,
     profile_remarks,
@@ -63,6 +64,7 @@ def prepare(
     step, _ = steps.at(speed)
     unusual = [*settings.unusual(), *vehicle_remarks(vehicle, model)]
     unusual += [*gauge_remarks(model.flat, track), *narrow_remarks(model, track.gauge)]
+    unusual += flangeway_remarks(model, track)
     remarks: list[str] = [*balance.remarks, *map(str, unusual), *measured_remarks(track)]
     remarks += profile_remarks(model, profiles)
     if before is None:

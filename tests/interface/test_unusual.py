@@ -12,7 +12,12 @@ from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.model.assembly import without_rails
-from railsim.model.plausibility import gauge_remarks, narrow_remarks, vehicle_remarks
+from railsim.model.plausibility import (
+    flangeway_remarks,
+    gauge_remarks,
+    narrow_remarks,
+    vehicle_remarks,
+)
 from railsim.model.preloads import static_shares
 from railsim.profiles import load_profile
 from railsim.result import peak
@@ -282,6 +287,39 @@ def test_rails_closer_than_the_flanges_are_remarked_on(narrower, wedged):
     assert bool(remarks) == wedged
     said = "1425.0 mm over its flanges, the rails are 1424.5 mm apart at s = 1.0 m"
     assert all(said in str(remark) and "and 1 more" in str(remark) for remark in remarks)
+
+
+@pytest.mark.parametrize(
+    ("widths", "said"),
+    [
+        ((0.041, 0.041), []),
+        ((0.032, 0.0), ["a flange of 32.5 mm in the flangeway of check_rail.0, 32.0 mm"]),
+        # 1435 - 2 x 37.4 mm
+        (
+            (0.0374, 0.0374),
+            ["1360.0 mm between its backs, the faces of check_rail.0 and 1 are 1360.2 mm apart"],
+        ),
+        ((0.0374, 0.0377), []),
+    ],
+)
+def test_flangeways_without_room_are_remarked_on(widths, said):
+    """The flares, 60 mm wide, are no narrow places, nor are two that do not stand together."""
+    rails = [
+        {
+            "rail": rail,
+            "flangeway": [[s, 0.06], [s + 3.0, width], [s + 8.0, width], [s + 9.0, 0.06]],
+        }
+        for rail, width, s in zip(("left", "right"), widths, (10.0, 12.0), strict=True)
+        if width
+    ]
+    rails.append({"rail": "left", "flangeway": [[40.0, 0.035], [50.0, 0.035]]})
+    model = SimpleNamespace(
+        flat=flatten(load_vehicle("coach_manchester")), profiles={"S1002": load_profile("S1002")}
+    )
+    track = load_track("straight").replace(check_rail=rails)
+    found = [*map(str, flangeway_remarks(model, track))]
+    assert len(found) == len(said)
+    assert all(words in remark for words, remark in zip(said, found, strict=True))
 
 
 @cache
