@@ -266,6 +266,8 @@ LONG = frozenset(
         "test_derivatives_of_a_free_oscillation_are_the_closed_ones[forward]",
         "properties/test_mechanism_scaling.py::"
         "test_an_enlarged_mechanism_has_every_result_enlarged_by_its_unit[tilting_two_springs]",
+        "unit/test_kernel_cache.py::test_edited_callee_in_another_file_gives_the_new_number",
+        "unit/test_threads.py::test_exception_in_the_block_of_a_pool_kills_its_workers",
     }
 )
 """Long tests, most of them beside others of the same thing; marked `further`."""

@@ -219,6 +219,7 @@ def test_a_car_between_held_bogies_bounces_on_its_springs():
     assert any("hunting" in mode.name for mode in bogies)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_modes_of_the_same_eigenvalue_are_those_of_the_front_and_rear_bogie_in_any_mixture():
     """Yaw of the frames of two bogies that do not feel each other, at 26.87 Hz."""
     speed = 20.0
