@@ -268,6 +268,22 @@ LONG = frozenset(
         "test_an_enlarged_mechanism_has_every_result_enlarged_by_its_unit[tilting_two_springs]",
         "unit/test_kernel_cache.py::test_edited_callee_in_another_file_gives_the_new_number",
         "unit/test_threads.py::test_exception_in_the_block_of_a_pool_kills_its_workers",
+        "interface/test_benchmarks.py::"
+        "test_script_runs_in_its_small_form_and_a_process_of_its_own[growth.py]",
+        "interface/test_benchmarks.py::"
+        "test_script_runs_in_its_small_form_and_a_process_of_its_own[study_cost.py]",
+        "interface/test_report.py::"
+        "test_printed_page_names_the_runs_of_its_curves_and_cuts_off_no_table",
+        "interface/test_study_pictures.py::test_seeds_are_no_axis[speeds1]",
+        "reliability/test_surroundings.py::test_names_are_shown_literally",
+        "unit/test_foreign_calls.py::"
+        "test_ten_thousand_calls_leave_all_arrays_alive_and_the_result_the_same[many_derivatives]",
+        "unit/test_kernels_without_compiler.py::"
+        "test_fields_of_a_patch_are_the_same_without_compilation[0.3]",
+        "verification/test_crossing_runs.py::test_short_ramps_are_what_the_formula_leaves_out[27.8]",
+        "verification/test_hollow_wheels.py::"
+        "test_coach_on_hollow_wheels_runs_the_same_with_half_the_step[0.0025-0.025-rigid-250.0-20.0]",
+        "verification/test_step_halving.py::test_run_is_lively[3 m/s]",
     }
 )
 """Long tests, most of them beside others of the same thing; marked `further`."""
