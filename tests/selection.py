@@ -284,6 +284,28 @@ LONG = frozenset(
         "verification/test_hollow_wheels.py::"
         "test_coach_on_hollow_wheels_runs_the_same_with_half_the_step[0.0025-0.025-rigid-250.0-20.0]",
         "verification/test_step_halving.py::test_run_is_lively[3 m/s]",
+        "interface/test_study.py::"
+        "test_killed_group_that_is_resumed_has_the_summary_of_an_undisturbed_study",
+        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[versions.py]",
+        "unit/test_threads.py::test_workers_end_with_a_process_that_ends_without_a_word",
+        "verification/test_sprung_wheelset.py::"
+        "test_a_coned_wheelset_on_springs_follows_random_alignment",
+        "verification/test_actuators.py::test_speed_over_a_gradient_and_after_a_profile",
+        "interface/test_mechanism.py::test_every_axis_of_every_picture_says_its_unit",
+        "reliability/test_fuzzed_inputs.py::test_results_made_up_by_others",
+        "reliability/test_kills.py::"
+        "test_end_that_hangs_is_ended_and_a_second_signal_does_not_disturb_it",
+        "interface/test_stability_commands.py::"
+        "test_map_that_is_interrupted_while_it_is_drawn_goes_on",
+        "verification/test_hollow_wheels.py::"
+        "test_load_moves_across_a_hollow_as_by_boundary_elements[0.0015-0.05-0.0032]",
+        "verification/test_contact_table.py::"
+        "test_patch_under_load_lies_on_the_common_normal_of_two_circles[30.0]",
+        "verification/test_crossing_runs.py::test_contacts_evaluated_again_are_counted_once",
+        "verification/test_sliding.py::test_slow_run_over_ramps_leaves_what_the_loop_leaves",
+        "interface/test_imports.py::test_commands_import_nothing_that_they_do_not_use[definitions]",
+        "verification/test_twin_tracks.py::"
+        "test_alignment_is_a_wave_of_the_plan_in_a_curve[10.0-0.002]",
     }
 )
 """Long tests, most of them beside others of the same thing; marked `further`."""
