@@ -13,9 +13,7 @@ from railsim.linear.eigenmodes import SEARCHED, At, Eigenmodes, eigenmodes
 LOWEST = 0.1  # Hz, of an oscillation that loses its stability: sways on cones of 0.005 have 0.28
 ROUNDING = 1e-9  # 1/s, growth that counts as none: without friction some modes are not damped
 STEP = 0.2  # of the parameter, in which a loss of stability is looked for
-CLOSER = (
-    5  # parameters from the step before a loss of stability to it, at which one is sought below
-)
+CLOSER = 5  # parameters of the last two steps before a loss, between which a lower one is sought
 
 
 @dataclass(frozen=True)
@@ -75,11 +73,9 @@ def loss_of_stability(
         if unstable is None and after == high:  # a peak in the last interval
             unstable = _beyond_zero(growth, passed, half, after, high)
         if unstable is not None or after == high:
-            end = (
-                high
-                if unstable is None
-                else zero(passed if unstable > passed else before, unstable)
-            )
+            end = high
+            if unstable is not None:
+                end = zero(passed if unstable > passed else before, unstable)
             near = np.linspace(before, end, CLOSER).tolist()
             peaks = (_beyond_zero(growth, *near[k : k + 3]) for k in range(CLOSER - 2))
             lower = next((peak for peak in peaks if peak is not None), None)
