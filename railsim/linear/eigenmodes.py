@@ -164,14 +164,10 @@ def _ordered(modes: Eigenmodes, indices: Indices) -> Eigenmodes:
     return Eigenmodes(modes.linearisation, values, shapes, left)
 
 
-def divergence(modes: Eigenmodes) -> tuple[str, ...]:
-    """Remark on an equilibrium that is left without an oscillation: a real lambda > 0."""
-    still = modes.eigenvalues[np.abs(modes.frequencies) < SLOWEST].real
-    growth = float(np.max(still, initial=0.0))
-    if growth < GROWS:
-        return ()
-    return (
-        f"a motion that does not oscillate grows by {growth:.3g} 1/s: the vehicle leaves the state "
-        "that is linearised for one beside it, as on hollow treads, whose radius falls towards the "
-        "flange at first; modes and linear critical speeds are not those of where it runs",
-    )
+def divergent(modes: Eigenmodes) -> Eigenmodes | None:
+    """The mode that grows most without an oscillation, a real lambda > 0; None if there is none."""
+    still = np.flatnonzero(np.abs(modes.frequencies) < SLOWEST)
+    growth = modes.eigenvalues[still].real
+    if np.max(growth, initial=0.0) < GROWS:
+        return None
+    return modes.taken([int(still[np.argmax(growth)])])

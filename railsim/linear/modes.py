@@ -14,15 +14,8 @@ from railsim.arrays import Complexes
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
 from railsim.errors import argument_error, nearest, optional_package
-from railsim.linear.eigenmodes import (
-    SEARCHED,
-    SLOWEST,
-    Eigenmodes,
-    divergence,
-    eigenmodes,
-    followed,
-)
-from railsim.linear.naming import Parts, apart, mode_name, parts_of
+from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
+from railsim.linear.naming import Parts, apart, divergence, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
 from railsim.plottable import Plottable
 from railsim.profiles import Profile
@@ -421,7 +414,7 @@ def _named(
         shown = (positions / largest if largest else positions).tolist()
         shapes = dict(zip(c.names[: c.n_positions], shown, strict=True))
         listed.append(Mode(name_of[k], complex(value), _participation(parts, shape), shapes))
-    remarks = (*prepared.remarks, *divergence(found))
+    remarks = (*prepared.remarks, *divergence(parts, found))
     about = remarks, parameter, prepared.name, prepared.place
     return Modes(speed, prepared.contact, tuple(listed), *about)
 

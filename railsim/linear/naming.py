@@ -32,7 +32,7 @@ from scipy.linalg import eigh
 from railsim.arrays import Complexes, Floats
 from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET
 from railsim.linear.coordinates import Coordinates
-from railsim.linear.eigenmodes import SLOWEST, Eigenmodes
+from railsim.linear.eigenmodes import SLOWEST, Eigenmodes, divergent
 from railsim.model.assembly import Model
 from railsim.notation import COMPONENTS
 
@@ -147,6 +147,32 @@ def mode_name(parts: Parts, modes: Eigenmodes, k: int = 0) -> str:
     if body in parts.wheelsets:
         return _wheelset_name(parts, shares, component)
     return f"{parts.model.index.bodies[body]}.{COMPONENTS[component]}"
+
+
+def divergence(parts: Parts, modes: Eigenmodes) -> tuple[str, ...]:
+    """Remark on an equilibrium that is left without an oscillation.
+
+    Wheelsets leave it, as on hollow treads, where one moves at least half as far as the body that
+    moves farthest; under a body that tips over they hardly move.
+    """
+    mode = divergent(modes)
+    if mode is None:
+        return ()
+    bodies = (*parts.wheelsets, *parts.cars, *parts.frames)
+    ways = {b: max(abs(parts.component(mode.shapes[0], b, k)) for k in range(3)) for b in bodies}
+    farthest = max(bodies, key=lambda body: ways[body])
+    cause = ""
+    if max(ways[body] for body in parts.wheelsets) < 0.5 * ways[farthest]:
+        name = parts.model.index.bodies[farthest]
+        cause = f", and {name} moves farthest, as where springs do not hold it upright"
+    elif ways[farthest] > 0.0:
+        cause = " for one beside it, as on hollow treads, whose radius falls towards the flange at "
+        cause += "first"
+    return (
+        f"a motion that does not oscillate grows by {mode.eigenvalues[0].real:.3g} 1/s: the "
+        f"vehicle leaves the state that is linearised{cause}; modes and linear critical speeds are "
+        "not those of where it runs",
+    )
 
 
 def _wheelset_name(parts: Parts, shares: Floats, component: int) -> str:

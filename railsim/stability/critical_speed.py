@@ -15,10 +15,10 @@ from railsim.definitions.limits import Situation
 from railsim.definitions.loading import load_running_limits, load_track
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Faults, InputError, ModelError
-from railsim.linear.eigenmodes import SEARCHED, Eigenmodes, divergence, eigenmodes, oscillations
+from railsim.linear.eigenmodes import SEARCHED, Eigenmodes, eigenmodes, oscillations
 from railsim.linear.harmonic import ContactPath
 from railsim.linear.modes import SPEED_RANGE
-from railsim.linear.naming import mode_name, parts_of
+from railsim.linear.naming import divergence, mode_name, parts_of
 from railsim.linear.stability_loss import LossOfStability, loss_of_stability
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, conditions, smooth_law
 from railsim.notation import COMPONENTS
@@ -236,7 +236,7 @@ def _linear(
 
     lost, stuck = _loss_of_hunting(prepared, low, high), None
     # on hollow treads it grows about as the speed: at walking pace it may pass for none
-    ends = (divergence(eigenmodes(prepared.linearised(speed))) for speed in (low, high))
+    ends = (divergence(parts, eigenmodes(prepared.linearised(speed))) for speed in (low, high))
     found.divergence = next(filter(None, ends), ())
     found.remarks += found.divergence
     if prepared.sticking:

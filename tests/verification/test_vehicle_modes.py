@@ -10,7 +10,7 @@ from suspension import Suspension
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.modes import Mode, modes
-from railsim.linear.naming import apart, mode_name, parts_of
+from railsim.linear.naming import apart, divergence, mode_name, parts_of
 from railsim.linear.vehicle import LinearVehicle
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
@@ -250,3 +250,30 @@ def test_modes_of_the_same_eigenvalue_are_those_of_the_front_and_rear_bogie_in_a
 def test_a_mode_that_neither_swings_nor_decays_has_no_damping_ratio():
     assert Mode("", 0j, {}, {}).damping_ratio == 0.0
     assert Mode("", -3.0 + 4.0j, {}, {}).damping_ratio == pytest.approx(3.0 / 5.0)
+
+
+def test_a_car_that_tips_over_is_told_from_wheelsets_that_leave_the_middle():
+    """9 m above the rails its weight outdoes the springs; beside it a shape as on hollow treads."""
+
+    def raised(kind, name, table):
+        if name == "carbody":
+            table["position"] = [0.0, 0.0, -9.0]
+
+    track = load_track("straight").replace(support={"preset": "rigid"})
+    tall, coach = (
+        LinearVehicle(vehicle, track, settings=Settings())
+        for vehicle in (
+            changed(load_vehicle("coach_manchester"), raised),
+            load_vehicle("coach_manchester"),
+        )
+    )
+    tips = divergence(parts_of(tall.model, tall.coordinates), eigenmodes(tall.linearised(20.0)))
+    assert "and carbody moves farthest, as where springs do not hold it upright" in " ".join(tips)
+    assert "hollow" not in " ".join(tips)
+    parts, found = parts_of(coach.model, coach.coordinates), eigenmodes(coach.linearised(20.0))
+    assert not divergence(parts, found)
+    hunting = next(
+        k for k in range(len(found.eigenvalues)) if "front hunting" in mode_name(parts, found, k)
+    )
+    grows = replace(found.taken([hunting]), eigenvalues=np.array([1.0 + 0.0j]))
+    assert "as on hollow treads" in " ".join(divergence(parts, grows))
