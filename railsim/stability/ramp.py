@@ -60,6 +60,21 @@ def hunting(motion: Motion, speed: float, excitations: Sequence[float]) -> Stret
     return seen
 
 
+def grown(motion: Motion, seen: Stretch, speed: float) -> Stretch:
+    """What a motion grows to, such as a sway of stuck friction by a tenth in 10 s.
+
+    A ramp from a motion far smaller than that dies at speeds at which the grown one lasts.
+    """
+    with suppress(LeftRange):
+        for _ in range(MOST_HALVES):
+            further = motion.stretch(seen.state, speed, speed, HOLD)
+            further = motion.stretch(further.state, speed, speed, 2.0 * WINDOW)
+            if further.amplitude <= (1.0 + CHANGE) * seen.amplitude:
+                break
+            seen = further
+    return seen
+
+
 def moved(motion: Motion, state: Floats, begin: float, end: float) -> Floats:
     """A state at another speed, after braking or accelerating to it."""
     if abs(end - begin) < 1e-9:
@@ -97,7 +112,8 @@ def ramp(
     while True:
         hard: list[Point] = []
         try:
-            hard.append(seen_at(speed, hunting(motion, speed, excitations)))
+            seen = grown(motion, hunting(motion, speed, excitations), speed)
+            hard.append(seen_at(speed, seen))
             _brake(motion, hard, low, BRAKING, lambda share: tell(0.3 * share))
             break
         except LeftRange:  # excited, or while it brakes

@@ -211,6 +211,20 @@ def test_motions_below_the_end_of_a_ramp_are_found_though_rest_is_stable_there()
     assert found.remarks == []
 
 
+def test_a_ramp_begins_with_what_a_small_motion_grows_to():
+    """Below 15 m/s, down to 13, only more than 0.3 mm lasts; 0.1 mm grows to 0.45 in 100 s."""
+
+    class Sway(Cycles):
+        def stretch(self, state, begin, end, duration):
+            lasts = end >= 15.0 or (end >= 13.0 and state[0] > 0.3e-3)
+            self.growth = lambda _: 0.02 if lasts else -0.05
+            return super().stretch(state, begin, end, duration)
+
+    lowest, branch = ramp(Sway(None, 5.0), 5.0, 15.5, excitations=(1e-4,))
+    assert branch.points[0].amplitude == pytest.approx(np.sqrt(0.02 / 1e5), rel=0.05)
+    assert lowest.speed == pytest.approx(13.0, abs=0.2)
+
+
 def test_without_a_hunting_mode_one_that_moves_the_wheelsets_is_excited(monkeypatch):
     """A pitching car moves them by rounding only: in its shape 8 mm of them derail any vehicle.
 
