@@ -5,6 +5,7 @@ from typing import Any
 import click
 
 from railsim.cli import common as cli
+from railsim.errors import RailsimError
 from railsim.processes import begin_server
 
 
@@ -44,4 +45,6 @@ def command(study: str, output: cli.Output, **how: Any) -> None:
 
     with output.studying("optimise") as studying:
         found = optimise(study, out=str(output.out), **studying, **how)
+    if found.failure:
+        raise RailsimError(f"{found.failure}; study.json holds the reasons")
     output.answer({"folder": str(found.folder), **found.record()}, found.parts())

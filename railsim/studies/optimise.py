@@ -100,15 +100,12 @@ class Optimisation:
 
     def parts(self) -> list[str | Table]:
         """Return sentences and tables: the front, the chosen design, what depends on what."""
+        if self.failure:
+            return [self.failure]
         if self.chosen is None:
-            reasons = {design.reason for design in self.designs if design.reason}
-            why = f": {sorted(reasons)[0]}" if reasons else ""
-            number = f"none of {len(self.designs)} designs"
             known = [design for design in self.designs if math.isfinite(design.excess)]
-            if not known:
-                return [f"{number} has values{why}"]
-            words = f"{number} keeps all constraints{why}"
             nearest = min(known, key=lambda design: design.excess)
+            words = self._none("keeps all constraints")
             return [words, "", self._shown([nearest], nearest, "nearest")]
         shown = [*self.front[:: max(1, math.ceil(len(self.front) / MOST_ROWS))]]
         if self.chosen not in shown:
@@ -122,6 +119,17 @@ class Optimisation:
             parts.append(f"without the {unknown} designs that have no values:")
         parts += [one.sentence() for one in self.sensitivities]
         return [*parts, *map(str, self.vehicles), str(self.folder / "front.png")]
+
+    @property
+    def failure(self) -> str:
+        """Return the sentence that no design has values, with a reason; empty if one has."""
+        if any(not math.isnan(sum(design.values)) for design in self.designs):
+            return ""
+        return self._none("has values")
+
+    def _none(self, what: str) -> str:
+        reasons = sorted({design.reason for design in self.designs if design.reason})
+        return ": ".join([f"none of {len(self.designs)} designs {what}", *reasons[:1]])
 
     def _shown(self, shown: Sequence[Design], marked: Design, mark: str) -> Table:
         """Some rows of the table, `mark` beside one of them."""

@@ -22,6 +22,7 @@ CELLS = 1024  # points for the estimate of the gain of a candidate
 SHARES = 8192  # points for the shares of the cube that are nearest to designs
 SMALLEST_DISTANCE = 2e-3  # of the cube's side, between designs
 NO_ANSWER = 1e9  # excess of designs without values
+ROUND_OFF = 1e-9  # range of values over the largest, below which they count as equal
 MARGIN = 0.1  # distance of the reference point beyond the front, as a share of its range
 
 
@@ -276,19 +277,31 @@ METHODS: dict[str, Callable[[Task], None]] = {
 }
 
 
+def varied(values: Floats) -> Flags:
+    """Return which columns vary by more than round-off, as of eigenvalues."""
+    high, low = values.max(axis=0, initial=-np.inf), values.min(axis=0, initial=np.inf)
+    found: Flags = high - low > ROUND_OFF * np.minimum(np.abs(high), np.abs(low))
+    return found
+
+
 def non_dominated(values: Floats) -> Flags:
     """Return which rows are not dominated: no other is as small in all columns, smaller in one.
 
-    Of equal rows only the first is non-dominated; rows with NaN are dominated.
+    Of equal rows only the first is non-dominated; rows with NaN are dominated.  A column that
+    varies by round-off only counts as equal in all rows.
 
     >>> non_dominated(np.array([[1.0, 3.0], [2.0, 2.0], [2.0, 3.0], [np.nan, 0.0]])).tolist()
     [True, True, False, False]
+    >>> non_dominated(np.array([[1.0, 3.0 + 1e-12], [2.0, 3.0]])).tolist()
+    [True, False]
     """
+    known = ~np.isnan(values).any(axis=1)
+    values = np.where(varied(values[known]), values, 0.0)
     found = np.zeros(len(values), dtype=np.bool_)
     front = np.empty((0, values.shape[1]))
     for i in np.lexsort(values.T[::-1]):  # a row can only be dominated by rows before it
         row = values[i]
-        if not np.isnan(row).any() and not (front <= row).all(axis=1).any():
+        if known[i] and not (front <= row).all(axis=1).any():
             found[i] = True
             front = np.vstack([front, row])
     return found

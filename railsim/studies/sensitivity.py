@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.studies.search import Surrogate
+from railsim.studies.search import Surrogate, varied
 
 DOUBTFUL = 0.05  # share of the variance that a surrogate misses, from which it is said
 SAMPLES = 1024  # a power of two, times the number of variables and two
@@ -71,22 +71,20 @@ def sensitivities(
     ends[np.arange(count), np.arange(count)] = 0.0
     ends[count + np.arange(count), np.arange(count)] = 1.0
     low, high = np.split(model(ends), 2)
-    spread = np.ptp(values[known], axis=0)
-    # a quantity that varies by round-off, as of eigenvalues, has no variance to explain
-    varied = np.flatnonzero(spread > 1e-9 * np.abs(values[known]).max(axis=0))
+    explained = np.flatnonzero(varied(values[known]))  # the rest has no variance
     first, total = np.zeros((2, len(quantities), count))
     if count == 1:
-        first[varied] = total[varied] = 1.0
-    elif len(varied):
+        first[explained] = total[explained] = 1.0
+    elif len(explained):
         distributions: list[Any] = [uniform()] * count
         indices = sobol_indices(
-            func=lambda x: model(x.T)[:, varied].T,
+            func=lambda x: model(x.T)[:, explained].T,
             n=SAMPLES,
             dists=distributions,
             random_state=np.random.default_rng(0),
         )
-        first[varied] = np.reshape(indices.first_order, (len(varied), count))
-        total[varied] = np.reshape(indices.total_order, (len(varied), count))
+        first[explained] = np.reshape(indices.first_order, (len(explained), count))
+        total[explained] = np.reshape(indices.total_order, (len(explained), count))
     errors = model.errors()
     found = []
     for k, quantity in enumerate(quantities):

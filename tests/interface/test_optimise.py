@@ -288,15 +288,37 @@ def test_a_design_that_derails_has_no_values(tmp_path):
     assert header.split(",")[2:4] == ["Y_peak (N)", "Q_peak (N)"]
 
 
+@pytest.mark.parametrize("more", [["--quiet"], ["--json"], ["--choose", "2"]])
+def test_it_fails_where_every_design_does(tmp_path, capsys, more):
+    """No steady rolling in a curve of 20 m; the reason is that of the study."""
+    file = written(tmp_path, STUDY.replace("radius = 300.0", "radius = 20.0"))
+    command = ["optimise", file, "--out", str(tmp_path / "o"), "--workers", "1"]
+    assert main([*command, "--evaluations", "2", *more]) == 1
+    said = capsys.readouterr()
+    assert "none of 2 designs has values: " in said.err
+    assert "study.json holds the reasons" in said.err
+    reasons = {
+        run["status_reason"] for run in json.loads((tmp_path / "o/study.json").read_text())["runs"]
+    }
+    assert any(f"has values: {reason}; " in said.err for reason in reasons)
+    if more == ["--json"]:
+        assert json.loads(said.out)["exit_status"] == 1
+
+
 def test_a_quantity_that_no_variable_changes_is_said_to_be(tmp_path, capsys):
-    """The least damped mode is one of the wheelsets on their springs, none of the car."""
+    """The least damped mode is one of the wheelsets on their springs, none of the car.
+
+    Its values differ by round-off of the eigenvalues: that is no front.
+    """
     text = STUDY.replace('kind = "curving"\nradius = 300.0\ncant = 0.15', 'kind = "modes"')
     text = text.replace("curve.T_gamma", "curve.damping").replace("curve.attack", "curve.damping")
     text = text.replace("curve.Y_over_Q", "curve.damping").replace(X, DAMPER)
     text = text.replace("5e6", "2e4").replace("40e6", "4e5")
     out = str(tmp_path / "o")
     assert main(["optimise", written(tmp_path, text), "--out", out, "--workers", "1"]) == 0
-    assert "curve.damping depends on: none of the variables" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "curve.damping depends on: none of the variables" in said
+    assert "front of 1 in 6 designs" in said
 
 
 def test_the_values_that_decide_are_in_the_table(tmp_path):
