@@ -14,6 +14,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
+from railsim.definitions.vehicle.loads import DESIGN
 from railsim.errors import Fault, Faults
 from railsim.notation import Quantity
 from railsim.result import Peak, Result, mid_curves, peaks
@@ -23,6 +24,7 @@ from railsim.text import in_words, printable, shortened
 
 BESIDE = 1e-6  # m, from ends of elements, at which the curvature may jump
 MOST_KEYS = 12  # of vehicles with different names
+NOT_GIVEN = {"load": DESIGN}  # what the absence of a value stands for
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 
 
@@ -116,7 +118,10 @@ def condition_table(found: Mapping[str, Sequence[str]], labels: Iterable[str]) -
 
 def differing(definitions: Sequence[Any]) -> dict[str, list[str]]:
     """Return the keys in which definitions differ, each with all its values in words."""
-    flat = [dict(flat_keys(one.model_dump())) for one in definitions]
+    flat = [
+        {key: NOT_GIVEN.get(key) if value is None else value for key, value in rows}
+        for rows in (flat_keys(one.model_dump()) for one in definitions)
+    ]
     return {
         key: [shortened(in_words(values.get(key, "—"))) for values in flat]
         for key in dict.fromkeys(key for values in flat for key in values)

@@ -160,7 +160,7 @@ def test_changed_keys_of_a_vehicle_are_said_with_their_values():
     found = conditions(other(railsim.load_vehicle("coach_manchester", assignments)))
     primary = "vehicle.assemblies.bogie.assemblies.axle.elements.primary.stiffness"
     assert found[primary] == ["31391000, 884665, 936340", "16000000, 884665, 936340"]
-    assert found["vehicle.load"] == ["none", "laden"]
+    assert found["vehicle.load"] == ["design", "laden"]
     assert len(found) == 2
     softer = railsim.load_vehicle("coach_manchester", [*assignments, "name=softer"])
     assert conditions(other(softer)) == {"vehicle": [base.vehicle().name, "softer"], **found}
