@@ -125,10 +125,15 @@ def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, memb
 
 @styled()
 def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
-    """Quantities over two parameters in colours; the median where several runs share a point."""
+    """Quantities over two parameters in colours; the median where several runs share a point.
+
+    Points that fill less than half of a grid, as those of a sample, are drawn where they are.
+    """
     figure, cells = _panels(len(quantities))
-    _name_medians(figure, list(zip(x.values, y.values, strict=True)))
+    points = list(zip(x.values, y.values, strict=True))
+    _name_medians(figure, points)
     columns, rows = x.different, y.different
+    scattered = x.numeric and y.numeric and 2 * len(set(points)) < len(columns) * len(rows)
     for axes, quantity in zip(cells, quantities, strict=True):
         there: dict[tuple[int, int], list[float]] = {}
         for triple in zip(quantity.values, x.values, y.values, strict=True):
@@ -138,8 +143,14 @@ def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
         values = np.full((len(rows), len(columns)), np.nan)
         for cell, found in there.items():
             values[cell] = float(np.median(found))
-        _draw_map(figure, axes, values, quantity)
         axes.set(title=quantity.words, xlabel=x.words, ylabel=y.words)
+        if scattered:
+            up, along = at = np.nonzero(np.isfinite(values))
+            places = np.take(columns, along), np.take(rows, up)
+            dots = axes.scatter(*places, c=values[at], cmap="viridis")
+            figure.colorbar(dots, ax=axes, pad=0.02)
+            continue
+        _draw_map(figure, axes, values, quantity)
         _ticks(axes.set_xticks, columns)
         _turned(axes)
         _ticks(axes.set_yticks, rows)

@@ -169,6 +169,20 @@ def test_curves_and_bands_hold_the_values():
     assert [t.get_text() for t in figure.axes[0].get_xticklabels()] == ["a", "b"]
 
 
+def test_points_of_a_sample_are_drawn_where_they_are():
+    """A map of six points without common coordinates would have 36 cells, 30 of them empty."""
+    x, y = [0.31, 0.12, 0.55, 0.44, 0.2, 0.05], [7.0, 9.0, 1.0, 4.0, 2.5, 8.0]
+    drawn = Column("Q", [1.0, 2.0, 3.0, 4.0, 5.0, None])
+    axes = map_figure([drawn], Column("x", x), Column("y", y)).axes[0]
+    (dots,) = axes.collections
+    found = zip(*np.transpose(dots.get_offsets()), dots.get_array(), strict=True)
+    assert (
+        sorted(found, key=lambda point: point[2]) == list(zip(x, y, drawn.values, strict=True))[:5]
+    )
+    assert not axes.get_images()
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x", "y")
+
+
 def test_map_and_ranking_hold_the_values():
     image = map_figure([VALUES], SPEED, VEHICLE).axes[0].get_images()[0]
     assert image.get_array().tolist() == [[1.0, 2.0], [3.0, 4.0]]
