@@ -111,6 +111,28 @@ class Comparison:
         shares = abs(self.mean) / self.mean_limit, self.deviation / self.limit
         return PASS if max(shares) <= 1.0 + ROUNDING else FAIL
 
+    def offsets(self) -> list[str]:
+        """Return the places whose mean differences cancel over curves of both hands, in words.
+
+        An offset of a channel adds to the magnitude in curves of one hand what it takes in those of
+        the other: the mean over all curves lacks it, the standard deviation alone has it.
+        """
+        by_place: dict[str, tuple[list[float], list[float]]] = {}
+        for pair in self.pairs if self.quantity.curves else ():
+            hands = by_place.setdefault(pair.place, ([], []))
+            hands[pair.radius > 0.0].append(pair.difference)
+        means = {
+            p: [float(np.mean(d)) for d in hands] for p, hands in by_place.items() if all(hands)
+        }
+        text, unit = self.quantity.column.text, self.quantity.unit
+        return [
+            f"{self.quantity.name} of {place}: mean difference {text(left)} in left-hand curves, "
+            f"{text(right)} {unit}".rstrip()
+            + " in right-hand ones: an 'offset' of a channel?"
+            for place, (left, right) in means.items()
+            if abs(left - right) > 2.0 * self.mean_limit
+        ]
+
 
 @dataclass(frozen=True, eq=False)
 class Overlay:

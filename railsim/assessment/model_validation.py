@@ -109,6 +109,7 @@ def validate_model(
             limit = limits.limits[name].at(Q0)
             mean, least = limits.mean * limit, limits.sections
             comparisons.append(Comparison(quantity, own, limit, mean, least))
+            remarks += comparisons[-1].offsets()
     if not all(one.checked for one in limits.limits.values()):
         remarks.append(f"limits of {limits.edition} not checked against the printed standard")
     said = tuple(dict.fromkeys(remarks))

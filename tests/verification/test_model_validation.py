@@ -1,6 +1,7 @@
 """A model against a test: the statistics by hand, the synthetic run of examples/measured_run."""
 
 import json
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -246,6 +247,27 @@ def test_quantity_whose_only_channels_rest_is_incomplete(measured, right):
     assert (found["Q_qst"].sections, found["Q_qst"].verdict) == (0, "incomplete")
     assert found.verdict == "incomplete"
     assert len(plots.scatter(found).axes) == len(found.comparisons) - 4  # Q, Y over Q
+
+
+def test_an_offset_that_cancels_over_curves_of_both_hands_is_said(measured, right):
+    """Of 0.5 m/s2, at one of two places: the mean lacks it, and 0.36 m/s2 of scatter pass.
+
+    In 7 curves of either hand the differences are -0.5 and +0.5 at one place, 0 at the other: the
+    standard deviation of the 28 is 0.5 (14/27)^0.5.
+    """
+    found = railsim.validate_model(spoilt(measured, floor1y=measured["floor1y"] + 0.5), right)
+    one = found["body_y_qst"]
+    assert one.mean == pytest.approx(0.0, abs=0.005)
+    assert one.deviation == pytest.approx(0.5 * (14.0 / 27.0) ** 0.5, abs=0.005)
+    assert one.verdict == "pass"
+    (said,) = [words for words in found.remarks if "'offset'" in words]
+    numbers = [float(word) for word in re.findall(r"-?\d\.\d+", said)]
+    assert numbers == pytest.approx([0.5, -0.5], abs=0.01)
+    assert re.sub(r"-?\d\.\d+", "#", said) == (
+        "body_y_qst of floor_front: mean difference # in left-hand curves, # m/s2 in right-hand "
+        "ones: an 'offset' of a channel?"
+    )
+    assert not any("'offset'" in words for words in railsim.validate_model(measured, right).remarks)
 
 
 def test_the_load_of_the_other_side_is_no_more_called_reversed_only(measured, right):
