@@ -6,6 +6,7 @@ of ISO 2631-1:1997, tables 3 and 4.
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 from unittest.mock import Mock
 
 import numpy as np
@@ -24,9 +25,10 @@ from railsim.assessment.comfort import (
     p_de,
     transition_comfort,
 )
-from railsim.assessment.comfort_report import PointComfort, _Gathered, short_of_blocks
+from railsim.assessment.comfort_report import MARGIN, PointComfort, _Gathered, short_of_blocks
 from railsim.assessment.criteria import CRITERIA, Measured, steering_index
 from railsim.assessment.en14363 import FREQUENCIES, hunting_frequency, spectrum
+from railsim.assessment.record import Record
 from railsim.assessment.safety import (
     climb_distance,
     flange_angle,
@@ -313,6 +315,41 @@ def test_responses_against_scipys_analogue_filters(name):
     f = np.geomspace(0.1, 80.0, 200)
     _, response = signal.freqs(above, below, 2 * np.pi * f)
     np.testing.assert_allclose(w.response(f), response, rtol=1e-9)
+
+
+# numerator and denominator over s/(2 pi), ISO 2631-1 annex A, constants of EN 12299
+LOWEST = np.polymul([1.0, 0.4 * np.sqrt(2.0), 0.4**2], [100.0**-2, np.sqrt(2.0) / 100.0, 1.0])
+STEP = 0.4 * np.array([2.5**-2, 1.0 / (0.8 * 2.5), 1.0]), [4.0**-2, 1.0 / (0.8 * 4.0), 1.0]
+
+
+@pytest.mark.parametrize("f", [0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 2.0, 8.0])
+def test_first_block_of_mean_comfort_is_free_of_the_start_of_the_record(f):
+    """A motion that began a minute before: of blocks from the start on it is up to 19 % off.
+
+    The lower band limit decays as exp(-2 pi 0.4 t/sqrt 2): 0.5 % are left after 3 s, which are not
+    assessed.  Whatever the phase at the start, with a quasi-static part beside it.
+    """
+    rate, before = 200.0, 60.0
+    t = np.arange(-before, 20.0, 1.0 / rate)
+    phases = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    whole = 0.5 + np.sin(2.0 * np.pi * f * t[:, None] + phases)
+    record = SimpleNamespace(time=t[t >= 0.0], rate=rate, rows=len(t[t >= 0.0]) - 1)
+    ((rows, counted),) = Record.pieces(record, MARGIN)
+    gathered = [_Gathered(0.0) for _ in phases]
+    for into, a in zip(gathered, whole[t >= 0.0][rows].T, strict=True):
+        into.add(np.stack([a, a, a], axis=-1), counted, rate)
+    first = np.array([into.blocks[0][0] for into in gathered])  # Wd along x, y, Wb along z
+
+    for axis, (corner, (above, below)) in enumerate(((2.0, ([1.0], [1.0])),) * 2 + ((16.0, STEP),)):
+        numerator = np.polymul(np.polymul([1.0, 0.0, 0.0], [1.0 / corner, 1.0]), above)
+        transition = [corner**-2, 1.0 / (0.63 * corner), 1.0]
+        denominator = np.polymul(np.polymul(LOWEST, transition), below)
+        frequencies = np.fft.rfftfreq(len(t), 1.0 / rate)
+        _, response = signal.freqs(numerator, denominator, frequencies)
+        spectrum = np.fft.rfft(whole, axis=0) * response[:, None]
+        block = np.fft.irfft(spectrum, len(t), axis=0)[(t >= 3.0 - 1e-9) & (t < 8.0 - 1e-9)]
+        by_hand = np.sqrt(np.mean(block**2, axis=0))
+        np.testing.assert_allclose(first[:, axis], by_hand, rtol=2.5e-3)
 
 
 def test_weighting_a_record_is_weighting_its_tones():
