@@ -295,7 +295,7 @@ def non_dominated(values: Floats) -> Flags:
     >>> non_dominated(np.array([[1.0, 3.0 + 1e-12], [2.0, 3.0]])).tolist()
     [True, False]
     """
-    known = ~np.isnan(values).any(axis=1)
+    known = np.logical_not(np.isnan(values).any(axis=1))
     values = np.where(varied(values[known]), values, 0.0)
     found = np.zeros(len(values), dtype=np.bool_)
     front = np.empty((0, values.shape[1]))
