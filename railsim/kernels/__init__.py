@@ -58,8 +58,8 @@ def compiled(function=None, *, python=True, inline=False, ordered=False, in_loop
     Parameters
     ----------
     python : bool
-        Whether Python calls it too.  If not, it is optimised and translated as a part of its
-        callers alone: half of the time of compilation.
+        Whether Python calls it too; its other threads go on meanwhile.  If not, it is optimised and
+        translated as a part of its callers alone: half of the time of compilation.
     inline : bool
         For a small function, such as a sum of vectors: numba puts it into its caller, which saves
         the compilation of a call.
@@ -69,14 +69,14 @@ def compiled(function=None, *, python=True, inline=False, ordered=False, in_loop
         free to reorder, it would do so in another way for each, and a run would depend on what else
         is in its call.
     in_loop : bool
-        False for use outside the time loop: it may allocate, and lets other Python threads run.
+        False for use outside the time loop: it may allocate.
     """
     if function is None:
         return functools.partial(
             compiled, python=python, inline=inline, ordered=ordered, in_loop=in_loop
         )
     options = {"inline": "always"} if inline else {}
-    if not in_loop:
+    if python:
         options["nogil"] = True
     return compiled_by(
         function,

@@ -6,6 +6,7 @@ straight smooth track; its position is set back after each stretch.
 """
 
 import math
+from copy import copy
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -93,14 +94,23 @@ class VehicleMotion:
         self.prepared, self.model, self.system = prepared, prepared.model, prepared.system
         self._scheme = scheme
         self._steps: dict[int, float] = {}
-        self._work = work_arrays(self.system)
-        size = self.model.n_state
-        self._derivative, self._stages = np.zeros(size), np.zeros((3, size))
-        self._recorder = empty_recorder(self.model, int(LONGEST * OUTPUT_RATE) + 2)
+        self._allocate()
         names, known = prepared.coordinates.names, mode.linearisation.names
         self._disturbed = prepared.coordinates.indices[[names.index(name) for name in known]]
         lateral = [known.index(f"{wheelset}.y") for wheelset in self.model.index.wheelsets]
         self._shape = (mode.shapes[0] / np.max(np.abs(mode.shapes[0, lateral]))).real
+
+    def _allocate(self) -> None:
+        self._work = work_arrays(self.system)
+        size = self.model.n_state
+        self._derivative, self._stages = np.zeros(size), np.zeros((3, size))
+        self._recorder = empty_recorder(self.model, int(LONGEST * OUTPUT_RATE) + 2)
+
+    def beside(self) -> "VehicleMotion":
+        """Return the same vehicle with arrays of its own, to move in another thread."""
+        other = copy(self)
+        other._allocate()
+        return other
 
     def step_at(self, speed: float) -> float:
         """Time step at a speed: the shorter one of those at both ends of its class [s]."""

@@ -5,6 +5,10 @@ included, so that the periodic motions are those of the scheme and the step that
 rates are counted from steady rolling at the speed at hand.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import cached_property
+
 import numpy as np
 
 from railsim.arrays import Floats, Integers
@@ -14,6 +18,7 @@ from railsim.kernels.time_loop import Chunk
 from railsim.linear.circle import POSITION
 from railsim.model.equilibrium import tracks_under
 from railsim.model.work import CONSTANT_SPEED
+from railsim.processes import available_cores
 from railsim.stability.motion import LeftRange, VehicleMotion
 
 # least sizes by which components are scaled, a difference quotient takes 1e-5 of them
@@ -72,6 +77,11 @@ class VehicleFlow:
         state[-3:] = 0.0, POSITION, speed
         return state
 
+    @cached_property
+    def _threads(self) -> list[VehicleMotion]:
+        """The motion, and the same for each further core."""
+        return [self._motion, *(self._motion.beside() for _ in range(available_cores() - 1))]
+
     def _steps(self, duration: float) -> int:
         """Number of steps in a period of the length of the runs' steps, as nearly as it fits."""
         return max(8, round(duration / self._step))
@@ -80,15 +90,19 @@ class VehicleFlow:
         """States after a while, one motion a row; all with the number of steps of the first."""
         steps = self._steps(float(durations[0]))
         ends = np.full_like(states, np.nan)
-        for row, state, duration, speed in zip(ends, states, durations, speeds, strict=True):
-            full = self.full(state, float(speed))
-            try:
-                self._motion.advance(
-                    self._system, full, float(duration) / steps, Chunk(1, steps, 1 << 40)
-                )
-            except LeftRange:
-                continue
-            row[:] = self.reduced(full)
+
+        def move(motion: VehicleMotion, rows: range) -> None:
+            for k in rows:
+                full = self.full(states[k], float(speeds[k]))
+                with suppress(LeftRange):
+                    step = float(durations[k]) / steps
+                    motion.advance(self._system, full, step, Chunk(1, steps, 1 << 40))
+                    ends[k] = self.reduced(full)
+
+        threads = self._threads[: len(states)]
+        every = [range(i, len(states), len(threads)) for i in range(len(threads))]
+        with ThreadPoolExecutor(len(threads)) as pool:
+            list(pool.map(move, threads, every))
         return ends
 
     def amplitude(self, state: Floats, duration: float, speed: float) -> float:

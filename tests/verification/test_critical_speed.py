@@ -20,7 +20,7 @@ from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.equilibrium import tracks_under
 from railsim.plot.stability import bifurcation_figure
-from railsim.stability import continuation
+from railsim.stability import continuation, vehicle_flow
 from railsim.stability import motion as motion_of
 from railsim.stability.branches import THRESHOLD, Branch, Point, first_beyond, lowest_of
 from railsim.stability.continuation import settled_to
@@ -821,6 +821,23 @@ def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest
     assert len(found) == 4
     assert np.array_equal(found[:, :LEARNT], before[:, :LEARNT])
     assert np.array_equal(found[:, LEARNT:], known[:, LEARNT:])
+
+
+def test_motions_in_threads_are_those_one_after_the_other(monkeypatch):
+    """To the bit, whatever the number of threads; each a lateral displacement of its own."""
+    of = LinearVehicle(load_vehicle("coach_manchester"), railsim.load_track("straight"))
+    motion = motion_of.VehicleMotion(of, "fast", CRITICAL._hunting_shape(of, 20.0))
+    flow = VehicleFlow(motion, 20.0)
+    states = [flow.reduced(motion.rest(20.0, size)) for size in np.linspace(-4e-3, 4e-3, 7)]
+    ends = []
+    for cores in (1, 3):
+        monkeypatch.setattr(vehicle_flow, "available_cores", lambda cores=cores: cores)
+        again = VehicleFlow(motion, 20.0)
+        ends.append(again.after(np.array(states), np.full(7, 0.1), np.full(7, 20.0)))
+        assert len(again._threads) == cores
+    assert np.array_equal(*ends)
+    assert np.isfinite(ends[0]).all()
+    assert np.ptp(ends[0], axis=0).max() > 1e-3
 
 
 def test_the_step_at_a_speed_that_two_classes_share_is_judged_once(monkeypatch):

@@ -182,6 +182,9 @@ class Turning:
         state[:2] += self.at(step * chunk.steps)
         return len(self.time)
 
+    def beside(self):
+        return self
+
     def at(self, t):
         late = np.array([0.0, 1.0])
         waves = 4.0 * np.pi * np.asarray(t)[..., None]
@@ -227,7 +230,7 @@ def test_periods_have_whole_steps_about_as_long_as_those_of_runs(turning, durati
     for k in (0, 2):
         moved = np.append(turning._motion.at(durations[k]), 0.0)
         assert ends[k] == pytest.approx(states[k] + moved, abs=1e-12)
-    asked = turning._motion.asked
+    asked = sorted(turning._motion.asked, key=lambda row: row[4][-1])  # threads take turns
     assert [row[2] for row in asked] == [steps] * 3
     assert [row[0] for row in asked] == pytest.approx(durations / steps)
     assert [row[4][-1] for row in asked] == [20.0, 21.0, 22.0]
