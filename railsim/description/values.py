@@ -44,7 +44,11 @@ def either(pair: Sequence[Any]) -> str:
 
 
 def short(value: object) -> str:
-    """Write a value shortly: 31.391e6 rather than 3.1391e+07."""
+    """Write a value shortly: 31.391e6 rather than 3.1391e+07.
+
+    >>> [short(value) for value in (12345.6, 1e5, -31.391e6, 2.5e9, (0.5, 2e8))]
+    ['12345.6', '100e3', '-31.391e6', '2.5e9', '[0.5 200e6]']
+    """
     if isinstance(value, tuple) and value and isinstance(value[0], tuple):
         return f"{len(value)} rows"
     if isinstance(value, tuple):

@@ -14,7 +14,7 @@ from railsim.contact.out_of_round import ACROSS, rolled_out, surface_arrays, whe
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.definitions.vehicle.out_of_round import Flat, Harmonics, Sections
+from railsim.definitions.vehicle.out_of_round import Flat, Harmonics, RadiusTable, Sections
 from railsim.errors import InputError
 from railsim.kernels.wheel_surface import angle_to_flat, surface_at
 from railsim.profiles import Profile
@@ -405,13 +405,18 @@ def with_file(folder, path):
     return load_vehicle(file)
 
 
-@pytest.mark.parametrize("order", [3, 24])
-def test_nodes_and_steps_resolve_the_shortest_wave_of_the_harmonics(order):
-    """It is the wheel's circumference over the highest order."""
+@pytest.mark.parametrize("order", [3, 24, 120])
+def test_nodes_and_steps_resolve_the_shortest_wave(order):
+    """It is the wheel's circumference over the highest order, of a table without what is small."""
     waves = [[1, 1e-4, 0.0], [order, 1e-5, 0.0]]
-    surface = wheel_surface((Harmonics(type="harmonics", waves=waves),), RADIUS, None, 0.75)
-    assert surface.wave == pytest.approx(2.0 * np.pi * RADIUS / order, rel=1e-12)
-    assert len(surface.ahead) >= 8 * order
+    angles = np.linspace(0.0, 2.0 * np.pi, 2000, endpoint=False)
+    change = 1e-4 * np.cos(angles) + 1e-5 * np.cos(order * angles) + 1e-6 * np.cos(150 * angles)
+    rows = np.stack([angles, change], axis=1).tolist()
+    for part in Harmonics(type="harmonics", waves=waves), RadiusTable(type="table", rows=rows):
+        surface = wheel_surface((part,), RADIUS, None, 0.75)
+        assert surface.wave == pytest.approx(2.0 * np.pi * RADIUS / order, rel=1e-12)
+        assert surface.flat == np.inf
+        assert len(surface.ahead) >= 8 * order
 
 
 @pytest.mark.parametrize("wheel", ["both", "right"])
