@@ -453,3 +453,26 @@ def test_the_order_of_strokes_and_tolerances_in_a_row_does_not_matter(tmp_path):
     path.write_text(path.read_text().replace("[900, 40, 40], [350,", "[200, 20, 20], [250,"))
     (row,) = selection(analyse(load_mechanism(path)))
     assert row.reasons == ("stroke 200 mm", "no tolerance of F1 stated above 250 N")
+
+
+def test_a_gas_spring_that_does_not_fit_says_by_how_much(tmp_path):
+    """Lengths of its line by hand, in mm; what does not fit is written once for each row."""
+    head = ARM.partition("[elements.load]")[0].replace("d = 0.1", "d = 0.1\n[derived]\nb = '-d'")
+    head = head.replace('foot = ["d", 0.0]', 'foot = ["d", 0.0]\nheel = ["b", 0.0]')
+    rows = (
+        "strokes = [0.2], F1 = [400, 900]",
+        "strokes = [0.001, 0.002], F1 = [100, 900]",
+        "strokes = [0.05], F1 = [100, 900]",
+        "strokes = [0.2], F1 = [100, 900], extended = [2.0, 0.3]",
+    )
+    made = ", ".join(f'{{ name = "{k}", {row} }}' for k, row in enumerate(rows))
+    path = tmp_path / "two.toml"
+    head = head.replace("start = 0.4", "start = 1.5").replace("end = 2.4", "end = 1.6")
+    path.write_text(head + SPRINGS.partition("made =")[0] + f"made = [{made}]")
+    least, most = sorted(1e3 * rod(angle, d=0.1)[0] for angle in (1.5, 1.6))
+    assert [row.reasons for row in selection(analyse(load_mechanism(path)))] == [
+        ("F1 300 N is not within 400 to 900 N",),
+        (f"stroke {most - least:.1f} mm is needed, 2 mm the largest",),
+        (f"compressed by {400.0 - least:.1f} mm, 50 mm at most",),
+        (f"{least:.1f} to {most:.1f} mm is no range of its lengths",),
+    ]
