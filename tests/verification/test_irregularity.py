@@ -7,7 +7,8 @@ from scipy.signal import welch
 from selection import points
 
 from railsim.definitions.excitations import TYPES
-from railsim.definitions.excitations.measured import largest_between_rows
+from railsim.definitions.excitations.measured import Measured, largest_between_rows
+from railsim.definitions.excitations.measured_file import read_measured
 from railsim.definitions.excitations.spectra import ERRI_B176, SPECTRA
 from railsim.definitions.loading import load_track
 from railsim.definitions.track.definition import Track
@@ -369,12 +370,30 @@ def test_measured_file_is_interpolated_and_becomes_part_of_the_track(measured):
     assert np.all(value[[0, 2, 3]] == 0.0)
 
 
-def test_measured_track_geometry_becomes_displacements_of_the_rails(measured):
-    rows = "\n".join(f"{x};0.001;0.002;0.004;0.006" for x in range(6))
-    track_ = load_track(measured("s_m;y;z;cross_level;gauge\n" + rows))
-    value, _ = rails(track_, [2.5])
-    expected = [0.001 - 0.003, 0.002 - 0.002, 0.001 + 0.003, 0.002 + 0.002]
-    np.testing.assert_allclose(value[:, 0], expected, atol=1e-15)
+METRES = {"": 1.0, "_m": 1.0, "_mm": 0.001, "_km": 1000.0, "_in": 0.0254, "_ft": 12 * 0.0254}
+
+
+@pytest.mark.parametrize("unit", METRES)
+@pytest.mark.parametrize("form", ["rails", "track"])
+def test_columns_of_a_measured_file_move_the_rails_as_they_are_defined(form, unit, tmp_path):
+    """y and z are the means of both rails, cross level and gauge right less left, here with a sign
+    turned and an offset of 2 mm; arc lengths are moved by none of them.
+    """
+    s = np.array([0.0, 1.0, 2.5, 3.0, 7.0])
+    a, b, c, d = 0.01 / METRES[unit] * np.cos(np.outer([0.3, 0.7, 1.1, 1.9], s))
+    of_rails, of_track = "y_left,z_left,y_right,z_right", "y,z,cross_level,gauge"
+    names = (of_rails if form == "rails" else of_track).split(",")
+    head = ",".join(["s_m", *(f"{name}{unit}" for name in names)])
+    path = tmp_path / "track.csv"
+    np.savetxt(path, np.column_stack([s, a, b, c, d]), delimiter=",", header=head, comments="")
+    zero = 2e-3 / METRES[unit]
+    how = {"reverse": (names[2],), "offset": {names[3]: zero}}
+    rows, mileage = read_measured(path, Measured(type="measured", file="track.csv", **how))
+    c, d = -c, d - zero
+    parts = (a, b, c, d) if form == "rails" else (a - d / 2, b - c / 2, a + d / 2, b + c / 2)
+    np.testing.assert_allclose(rows[:, 0], s, atol=1e-15)
+    np.testing.assert_allclose(rows[:, 1:].T, METRES[unit] * np.array(parts), atol=1e-12)
+    assert mileage is None
 
 
 def test_absolute_gauge_and_another_encoding_are_read_when_the_file_says_so(tmp_path):
