@@ -10,11 +10,11 @@ from selection import points
 
 from railsim.definitions.loading import load_spring
 from railsim.errors import InputError
-from railsim.plot.springs import stiffness_figure
+from railsim.plot.springs import ride_height_figure, stiffness_figure
 from railsim.springs import checks
 from railsim.springs.design import design
 from railsim.springs.summary import design_data, fatigue_data, ride_height_data, verification_data
-from railsim.springs.tolerance import ride_heights
+from railsim.springs.tolerance import RideHeight, ride_heights
 from railsim.springs.verification import dynamic_loads, fatigue, verify
 
 GOODMAN = [(0.0, 430e6), (390e6, 690e6), (690e6, 690e6)]
@@ -216,3 +216,19 @@ def test_the_curves_of_a_small_load_end_before_lift_off():
     load, K_sys = stiffness_figure(result).axes[0].lines[0].get_data()
     assert load[0] == pytest.approx(0.025, rel=0.05)
     assert np.all(np.isfinite(K_sys))
+
+
+def test_ride_heights_are_drawn_from_the_least_deviation_to_the_largest():
+    """Of the load case named; ranges of all, the light one first, in mm; the likely ones +-."""
+    one = {"spring.d": (-1e-3, 2e-3), "arm": (5e-3, -4e-3), "seat": (0.5e-3, 1e-3)}
+    heavy = RideHeight("crush", 9e4, -8e-3, 9e-3, 5e-3, {"arm": (1.0, -1.0)})
+    tare = RideHeight("tare", 5e4, -6e-3, 7e-3, 3e-3, one)
+    single, every = ride_height_figure([heavy, tare], "tare").axes
+    assert [label.get_text() for label in single.get_yticklabels()] == ["seat", "spring: d", "arm"]
+    lower, upper = single.containers
+    assert [bar.get_width() for bar in lower] == pytest.approx([0.5, -1.0, 5.0])
+    assert [bar.get_width() for bar in upper] == pytest.approx([1.0, 2.0, -4.0])
+    assert [label.get_text() for label in every.get_xticklabels()] == ["tare", "crush"]
+    ends = [line.get_ydata() for line in every.lines if len(line.get_ydata()) == 2][:4]
+    assert np.array(ends) == pytest.approx(np.array([[-6, 7], [-3, 3], [-8, 9], [-5, 5]]))
+    assert every.get_ylim()[1] > 9.0
