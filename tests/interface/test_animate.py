@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -300,6 +301,17 @@ def test_the_whole_vehicle_is_in_the_picture_of_a_film(result):
         bodies = [points for *_, points, face, _ in _polygons(scene, frame, 1.0) if face[0] != "#"]
         assert np.all(np.concatenate(bodies) > low)
         assert np.all(np.concatenate(bodies) < high)
+
+
+def test_the_drawn_rails_go_on_from_piece_to_piece(result):
+    """In a curve too: where one piece ends the next begins, with both of its edges."""
+    scene = result_scene(result, frames=4)
+    for frame in range(4):
+        rails = [points for *_, points, face, _ in _polygons(scene, frame, 1.0) if face[0] == "#"]
+        assert len(rails) == 2 * 22
+        for rail in rails[:22], rails[22:]:
+            for one, following in pairwise(rail):
+                np.testing.assert_allclose(one[[3, 2]], following[[0, 1]], atol=1e-9)
 
 
 def test_a_moved_body_is_seen_where_it_would_be_if_it_stood_there(result):
