@@ -34,6 +34,7 @@ SWAPPED = {
     "==": "!=", "!=": "==", "+=": "-=", "-=": "+=", "*=": "/=", "and": "or", "or": "and",
     "True": "False", "False": "True", "min": "max", "max": "min", "sin": "cos", "cos": "sin",
 }  # fmt: skip
+FACTORS = tokenize.NAME, tokenize.NUMBER, tokenize.STRING  # beside brackets
 SECONDS_PER_ERROR = 2400
 
 
@@ -53,11 +54,13 @@ def changes(path: Path) -> Iterator[Planted]:
     source = path.read_text()
     idle = _idle_lines(ast.parse(source))
     with path.open("rb") as file:
-        tokens = list(tokenize.tokenize(file.readline))
+        every = tokenize.tokenize(file.readline)
+        tokens = [token for token in every if token.type not in (tokenize.NL, tokenize.COMMENT)]
     for before, token, after in zip(tokens, tokens[1:], tokens[2:], strict=False):
         line, column = token.start
         # a star alone or in front of a sequence multiplies nothing
-        star = token.string == "*" and (before.string in "([{," or after.string == ",")
+        factor = before.type in FACTORS or before.string in (")", "]")
+        star = token.string == "*" and (not factor or after.string == ",")
         if line in idle or star:
             continue
         now = SWAPPED.get(token.string)
