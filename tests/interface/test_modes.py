@@ -88,6 +88,20 @@ def test_modes_of_a_locus_have_names_of_their_own():
     assert [mode["branch"] for mode in there] == list(found.names)
 
 
+@pytest.mark.parametrize(
+    ("key", "places", "words"),
+    [
+        ("speed", ["straight, upright"], "straight, upright, contact tangent"),
+        ("speed", ["straight, mu 0.3", "straight, mu 0.4"], "straight, contact tangent"),
+        ("mass", ["radius 300 m", "radius 400 m"], "20 m/s, contact tangent"),
+    ],
+)
+def test_a_title_of_a_locus_says_what_does_not_change_along_it(key, places, words):
+    sets = tuple(Modes(20.0, Contact(), (), place=place, vehicle="coach") for place in places)
+    values = tuple(range(len(places)))
+    assert RootLocus(key, values, sets).title == f"coach: {words}"
+
+
 def test_a_branch_of_a_locus_keeps_its_name_where_another_one_is_missing():
     """In records, which leave out what is not there at a value."""
     absent = complex(np.nan)
