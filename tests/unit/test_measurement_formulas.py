@@ -333,6 +333,18 @@ def test_a_step_of_one_and_a_half_is_a_gap(extra, gap):
     assert ("The record has 1 gaps, together 0.016 s" in said) is gap
 
 
+@pytest.mark.parametrize("long", [2, 3])
+def test_a_clock_of_few_digits_has_steps_of_one_and_two_digits_and_not_of_three(long):
+    """Two digits beside one are equal steps of 1.5, three are not equal to one: interpolated."""
+    steps = np.where(np.arange(300) % 2, long, 1.0)
+    written = 1e-3 * np.concatenate([[0.0], np.cumsum(steps)])
+    found = clock_of("made", written)
+    assert found.rate == pytest.approx(2000.0 / (1.0 + long), rel=1e-4)
+    assert ("unequal" in "".join(found.remarks)) is (long == 3)
+    rounding = 0.3e-3 if long == 2 else 1e-9
+    assert found.on_grid(written) == pytest.approx(found.time, abs=rounding)
+
+
 @pytest.mark.parametrize(("off", "equal"), [(0.24, True), (0.26, False)])
 def test_a_clock_may_leave_its_line_by_a_quarter_of_a_step(off, equal):
     number = np.arange(401)
