@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from railsim.profiles import load_profile
 from railsim.profiles.builtin import builtin_profile
-from railsim.profiles.readers import Points, _process_simpack
+from railsim.profiles.readers import Points, _miniprof, _process_simpack
 from railsim.profiles.smoothing import departures, smoothed_points
 
 
@@ -97,3 +97,22 @@ def test_what_was_measured_stands_beside_what_is_smoothed(tmp_path):
     assert np.max(np.abs(apart)) < 5.0 * noise
     assert np.std(apart[1]) == pytest.approx(noise, rel=0.3)
     assert np.interp(0.0, profile.y, profile.z) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "order"),
+    [
+        (["Wheel 920", "12 left of 4", "car 3 4"], "XY"),  # a title block, with numbers in it
+        (["ProgramName=MiniProf", "Radius=460", "XYPoints=3"], "XY"),
+        (["ColumnDef=X,Y", "XYPoints=3"], "XY"),
+        (["ColumnDef=A,Y, X", "XYPoints=3"], "AYX"),
+        (["columndef=y,x", '"a remark 1 2'], "YX"),
+    ],
+)
+def test_a_head_of_miniprof_is_no_point_and_names_the_columns(head, order):
+    values = {"X": [-1.0, 0.5, 2.0], "Y": [2.0, 3.0, 4.5], "A": [9.0, 8.0, 7.0]}
+    rows = [" ".join(map(str, row)) for row in zip(*(values[c] for c in order), strict=True)]
+    found = _miniprof("w.whl", [*head, "", *rows])
+    assert (found.y.tolist(), found.z.tolist()) == (values["X"], values["Y"])
+    assert found.line.tolist() == [len(head) + 2 + k for k in range(3)]
+    assert (found.unit, found.notes) == (1e-3, [])
