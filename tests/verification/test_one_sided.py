@@ -1,5 +1,7 @@
 """Pads, centre plates and wedges press and never pull: preloads, statics, modes, runs."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from dynamics import load_track, load_vehicle
@@ -12,6 +14,7 @@ from railsim.errors import ModelError
 from railsim.model.assembly import without_rails
 from railsim.model.plausibility import vehicle_remarks
 from railsim.model.preloads import static_shares
+from railsim.model.statics import _gaps
 
 PAD = {
     "kind": "side_bearer",
@@ -153,3 +156,33 @@ def test_pads_press_and_never_pull_in_a_run():
     assert force.min() > -1e-6  # N, round-off
     assert (np.abs(force) < 1e-6).any()
     assert force.max() > 1e3
+
+
+@pytest.mark.parametrize(
+    ("law", "free"),
+    [
+        # 20 mm to either side, of which y = 5 mm is used up
+        ({"axis": "y", "table": [[0.0, 0.0], [0.02, 0.0], [0.03, 1e5]]}, ("y", 0.015, 0.025)),
+        ({"axis": "x", "table": [[0.0, 0.0], [0.02, 0.0], [0.03, 1.0]]}, ("x", 0.019, 0.021)),
+        # rows that end free of force: no stop to this side
+        ({"axis": "y", "table": [[-0.1, 0.0], [0.02, 0.0], [0.03, 1e5]]}, ("y", 0.015, np.inf)),
+        ({"axis": "y", "table": [[-0.1, -1.0], [-0.09, 0.0], [0.2, 0.0]]}, ("y", np.inf, 0.095)),
+        ({"stop_table": [[-0.02, -1.0], [-0.01, 0.0], [0.0, 0.0], [0.03, 1.0]]},
+         ("z", -0.002, 0.012)),
+        ({"axis": "z", "table": [[0.0, 0.0], [0.02, 1e3]]}, ("z", -0.002, 0.002)),
+        ({"clearance": 0.003}, ("z", 0.001, np.inf)),
+        # pressed from the beginning, or no stop at all
+        ({"axis": "z", "table": [[-0.1, -2.0], [-0.09, 0.0], [-0.01, 0.0], [0.1, 1.0]]}, None),
+        ({"axis": "z", "table": [[-0.1, -2.0], [0.01, 0.0], [0.02, 0.0], [0.1, 1.0]]}, None),
+        ({"clearance": 0.0}, None),
+    ],
+)  # fmt: skip
+def test_free_travel_to_both_stops_is_what_their_table_leaves(law, free):
+    """Of an element whose body 2 has moved by (1, 5, 2) mm."""
+    element = SimpleNamespace(definition=SimpleNamespace(**law))
+    found = _gaps(element, np.array([0.001, 0.005, 0.002]))
+    if free is None:
+        assert found is None
+    else:
+        assert found[0] == free[0]
+        assert found[1:] == pytest.approx(free[1:])
