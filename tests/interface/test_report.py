@@ -704,7 +704,7 @@ def test_spread_has_the_values_of_every_run():
     assert column["values"] == pytest.approx([32.0, 40.0, 48.0, 56.0], rel=1e-5)
     words = "guiding force, peak magnitude (kN)"
     assert [words, "32.00", "run0", "44.00", "56.00", "run3"] in spread_rows(runs)
-    assert spread_rows(runs[:2]) == []  # three runs at least
+    assert (spread_rows(runs[:2]), len(spread_rows(runs[:3])) > 0) == ([], True)  # three at least
     assert worst_runs(runs, 2) == ["run2", "run3"]
     assert worst_runs(runs, 9) == ["run0", "run1", "run2", "run3"]
 

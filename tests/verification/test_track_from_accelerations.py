@@ -21,6 +21,7 @@ from railsim.measurement.counterpart import amplified, amplifier
 from railsim.observation import Assumed, contact, irregularity
 from railsim.observation.estimate import BANDS, Estimate, joined
 from railsim.observation.estimate import rms as deviation
+from railsim.observation.irregularity import _flanges
 from railsim.observation.pieces import Piece, on_grid
 from railsim.observation.simulated import SimulatedRun
 from railsim.plot.observation import irregularity_figure
@@ -538,6 +539,15 @@ def test_vehicle_that_is_another_one(coach):
     for name in ("alignment", "level", "cross_level"):
         for band in BANDS:
             assert rms(wrong[name, band][1]) < 2.0 * rms(right[name, band][1])
+
+
+def test_on_a_narrower_gauge_flanges_touch_by_half_of_it_earlier(linear):
+    touching = _flanges(linear, STRAIGHT)
+    assert len(touching) == 4
+    assert np.all((touching > 0.005) & (touching < 0.010))  # 5 mm of clearance, and the fillet
+    narrower = _flanges(linear, STRAIGHT.replace(gauge=1.431))
+    assert touching - narrower == pytest.approx(0.002, abs=1.1e-4)  # places every 0.05 mm
+    assert np.all(np.isinf(_flanges(linear, STRAIGHT.replace(gauge=1.445))))
 
 
 def test_pieces_are_joined_linearly_and_flanges_named_from_their_first_to_their_last_place():
