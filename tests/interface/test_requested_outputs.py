@@ -6,7 +6,9 @@ import pytest
 import railsim
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
+from railsim.kernels import contact_columns as contact
 from railsim.result.hdf5 import Hdf5Sink
+from railsim.simulation.outputs import _of_wheels_there
 from railsim.track.irregularity import displacement
 
 
@@ -44,6 +46,14 @@ def test_loads_of_the_patches_make_up_the_wheel_loads(result):
     # flange root the sum differs from the force, elsewhere they agree
     np.testing.assert_allclose(Y[:, :, 1], result.Y[:, :, 1], atol=200.0)
     np.testing.assert_allclose(Y[:, :, 0], result.Y[:, :, 0], atol=0.2 * np.abs(result.Y).max())
+
+
+def test_a_wheel_that_carries_nothing_has_no_point_of_contact():
+    wheel = np.zeros((1, 2, 2, contact.WHEEL_COLUMNS))
+    wheel[..., contact.W_NORMAL] = [[0.0, 5e4], [1.0, 0.0]]
+    wheel[..., contact.W_C_Y] = [[-0.75, 0.75], [-0.74, 0.76]]
+    there = [[np.nan, 0.75], [-0.74, np.nan]]
+    np.testing.assert_array_equal(_of_wheels_there(wheel, contact.W_C_Y)[0], there)
 
 
 def test_pressure_is_that_of_hertz(result):
