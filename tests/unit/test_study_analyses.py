@@ -1,4 +1,4 @@
-"""What the analyses of a study give as numbers."""
+"""Which speed the analyses of a study begin with, and what they give as numbers."""
 
 from importlib import import_module
 from types import SimpleNamespace
@@ -7,6 +7,34 @@ import pytest
 
 from railsim.definitions.study.analyses import CriticalSpeedAnalysis
 from railsim.studies.analyses import analysed
+from railsim.studies.case import Loader
+from railsim.studies.spec import RunSpec
+
+CRITICAL = {"c": CriticalSpeedAnalysis(kind="critical_speed", low=10.0, high=90.0)}
+
+
+@pytest.mark.parametrize(
+    ("analyses", "speed", "table", "expected", "said"),
+    [
+        ({}, 20.0, False, 20.0, []),
+        ({}, None, False, None, ["no speed is given"]),
+        ({}, None, True, 25.0, []),
+        ({}, 25.0, True, 25.0, []),
+        ({}, 20.0, True, None, ["found 20 m/s"]),
+        (CRITICAL, None, False, None, []),
+        (CRITICAL, None, True, None, []),  # of all speeds, whatever the table says
+        (CRITICAL, 20.0, False, 20.0, []),
+    ],
+)
+def test_a_run_begins_with_the_speed_that_is_given_or_that_of_its_table(
+    analyses, speed, table, expected, said
+):
+    """From 20 to 30 m/s over the first 100 m, of which the run begins at 50 m."""
+    drive = "settings.drive={mode='table', speed_table=[[0, 20.0], [100, 30.0]]}"
+    loader = Loader(analyses=analyses)
+    run = RunSpec("coach", "straight", speed, start=50.0, assignments=(drive,) if table else ())
+    assert loader.first_speed(run) == expected
+    assert [fault.found for fault in loader.faults] == said
 
 
 @pytest.mark.parametrize(
