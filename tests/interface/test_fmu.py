@@ -218,6 +218,15 @@ def test_the_unit_holds_no_path_and_says_what_it_needs(unit):
     assert f"Python that has railsim {railsim.__version__}" in description.replace("\n", " ")
     assert '<BaseUnit kg="1" m="1" s="-2"/>' in description
     assert re.search('<Float64 name="push"[^>]* unit="N"/>', description)
+    of_unit = description.partition("<CoSimulation")[2].partition(">")[0]
+    true = set(re.findall(r'(\w+)="true"', of_unit))
+    # attributes of FMI 3.0: what a master may rely on, and that a Python has to be there
+    assert true >= {
+        "needsExecutionTool",
+        "canGetAndSetFMUState",
+        "canSerializeFMUState",
+        "canHandleVariableCommunicationStepSize",
+    }
     assert validate_fmu(str(unit)) == []
     assert not any(str(unit.parent).encode() in content for content in contents)
 
