@@ -21,7 +21,7 @@ from railsim.definitions.elements.traction import Traction
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.random import Random
 from railsim.definitions.excitations.sweep import Sweep
-from railsim.definitions.limits import Zone
+from railsim.definitions.limits import RunningLimits, Zone
 from railsim.definitions.loading import load_comfort_limits, load_running_limits, load_wheel_limits
 from railsim.definitions.measurement import Channel
 from railsim.definitions.settings import Settings
@@ -441,6 +441,17 @@ AT_THE_BORDER = {
         severe, [(0.25, False), (above(0.25), True)]
     ),
 }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("of", "taken"),
+    [("sum_Y", True), ("frame_y", True), ("frame_instability", False), ("unknown", False)],
+)
+def test_a_limit_is_a_share_of_one_that_is_no_share_itself(of, taken):
+    share = {"law": "share", "value": 0.5, "of": of, "source": "x"}
+    whole = RUNNING.model_dump(mode="json", exclude_none=True)
+    whole["limits"]["instability"] = share
+    assert is_taken(RunningLimits.model_validate, whole) is taken
 
 
 @pytest.mark.parametrize(("function", "values"), AT_THE_BORDER.values(), ids=AT_THE_BORDER)
