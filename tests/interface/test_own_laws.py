@@ -1,5 +1,6 @@
 """Laws of one's own: what they compute, when they are executed, how they fail."""
 
+import ctypes
 import os
 
 import numpy as np
@@ -373,6 +374,25 @@ def test_a_late_signal_stands_for_the_quantity_of_its_name(coach, track):
 
 
 CONTROLLER = binding.Takes("a controller", ("time",), ("v",))
+
+
+@pytest.mark.parametrize(
+    ("returned", "given"),
+    [
+        ("10.0 * v + w", [32.0, 32.0, 32.0]),  # one value is for all
+        ("(v, w, time)", [3.0, 2.0, 0.5]),
+        ("(v, w)", [np.nan] * 3),
+    ],
+)
+def test_a_controller_of_three_actuators_gives_one_value_or_three(returned, given):
+    """Called as Python: a block of what it gives, the time, and its inputs in their order."""
+    source = f"def x(w, time, v):\n    return {returned}"
+    laws.allow(source)
+    takes = binding.Takes("a controller", ("time",), ("v", "w"))
+    bound = binding.bind("x", Law(source=source, file="mine.py", compiled=False), takes, 3)
+    block = np.array([9.0, 9.0, 9.0, 0.5, 3.0, 2.0])
+    ctypes.CFUNCTYPE(None, ctypes.c_void_p)(bound.address)(block.ctypes.data)
+    np.testing.assert_array_equal(block, [*given, 0.5, 3.0, 2.0])
 
 
 @pytest.mark.parametrize(
