@@ -720,6 +720,9 @@ def test_missing_rows_are_remarked_on(tmp_path):
     kept = ((s <= 20.0) | (s >= 32.0)) & ((s <= 50.0) | (s >= 52.0))
     (remark,) = measured_remarks(recorded(tmp_path, written(s[kept], z[kept]), shift=5.0))
     assert "no rows from s = 25.0 to 37.0 m, the longest of 2 such gaps" in remark
+    later = ((s <= 20.0) | (s >= 22.0)) & ((s <= 50.0) | (s >= 61.0))
+    (remark,) = measured_remarks(recorded(tmp_path, written(s[later], z[later])))
+    assert "no rows from s = 50.0 to 61.0 m, the longest of 2 such gaps" in remark
     few = kept & (s < 36.0) & (s > 15.0)  # a defect drawn by hand
     assert measured_remarks(recorded(tmp_path, written(s[few], z[few]))) == []
     (remark,) = measured_remarks(recorded(tmp_path, written(s, z), shift=-30.0))
