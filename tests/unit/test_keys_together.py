@@ -228,10 +228,11 @@ RULES = {
         Cam, {"cam": "a.p"},
         {"path": ["b.q"], "body": ["b"],
          "arcs": [[{"radius": 1.0, "turns": "left", key: value} for key, value in arcs]
-                  for arcs in ([("length", 1.0)] * 2, [("centre", (0.0, 0.0))] * 2,
+                  for arcs in ([("length", 1.0)], [("length", 1.0)] * 2,
+                               [("centre", (0.0, 0.0))] * 2,
                                [("length", 1.0), ("centre", (0.0, 0.0))])]},
         lambda path, body, arcs: (
-            arcs is not None and len({*arcs[0]} ^ {*arcs[1]}) == 0
+            arcs is not None and len({*arcs[0]} ^ {*arcs[-1]}) == 0
             and (path is not None) == ("length" in arcs[0])
             and (body is not None) == ("centre" in arcs[0])
         ),
