@@ -237,7 +237,7 @@ class Simulation:
     def _to_the_end(self) -> None:
         """Advance to the end by whole steps, and hand on the records of up to `STEPS` at once."""
         self._taken_back()
-        self._seen = None
+        self._seen, self._behind = None, 0.0
         while self.running:
             begin, evaluated = time.perf_counter(), self._run.evaluates
             whole = self._next()
