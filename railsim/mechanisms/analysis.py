@@ -92,9 +92,8 @@ class Analysis:
     @property
     def peak_force(self) -> float:
         """Largest amount of the unknown force in either sense, on the way and on the way back."""
-        names = [name for name in ("force", "force_back") if name in self.output]
-        found = [self.extremes(name) for name in names]
-        return max((max(-f.least, f.most) for f in found), default=np.nan)
+        least, most = either_way(self, "force")
+        return max(-least, most)
 
     @property
     def min_angles(self) -> dict[str, float]:
@@ -160,6 +159,13 @@ class Analysis:
             found, allowed = f"{value:g} is never reached", f"{low:.6g} to {high:.6g}"
             raise argument_error("at", found, allowed, key=quantity)
         return [{name: float(array[k]) for name, array in results.items()} for k in there]
+
+
+def either_way(result: Analysis, name: str) -> tuple[float, float]:
+    """Least and largest value, with friction on the way and on the way back; NaN for none."""
+    ways = [result.extremes(way) for way in (name, f"{name}_back") if way in result.output]
+    least = min((way.least for way in ways), default=np.nan)
+    return least, max((way.most for way in ways), default=np.nan)
 
 
 def analyse(definition: Mechanism, case: str | None = None) -> Analysis:

@@ -7,7 +7,7 @@ import numpy as np
 from railsim.definitions.mechanism.parts import Actuator, AirSpring, Cylinder, GasSpring, Piston
 from railsim.definitions.mechanism.values import points_of
 from railsim.design_checks import ROUNDING, Check
-from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.analysis import Analysis, either_way
 from railsim.mechanisms.components import lid_force, next_size
 from railsim.mechanisms.forces import chamber_area, unit_work
 from railsim.mechanisms.inversion import largest
@@ -24,7 +24,7 @@ def checks(result: Analysis) -> list[Check]:
 def _checks(result: Analysis) -> Iterator[Check]:
     definition, n = result.definition, result.model.number
     if definition.solve is not None:
-        yield from _forces(result, definition.actuators[definition.solve.unknown])
+        yield from _forces(result, definition.held_by)
     limits = definition.optimise
     if limits is not None and limits.min_transmission_angle is not None:
         limit = n(limits.min_transmission_angle)
@@ -47,8 +47,7 @@ def _checks(result: Analysis) -> Iterator[Check]:
     if result.contact is not None:
         note = "static contact force in the zone: the head must not come down"
         yield Check("contact_force", result.contact.least, 0.0, "above", "N", note)
-        assert definition.solve is not None
-        supply = getattr(definition.actuators[definition.solve.unknown], "supply_pressure", None)
+        supply = getattr(definition.held_by, "supply_pressure", None)
         if supply is not None:
             note = "pressure held for the contact force against the supply pressure"
             yield Check("held_pressure", result.contact.pressure, n(supply), "below", "Pa", note)
@@ -57,7 +56,7 @@ def _checks(result: Analysis) -> Iterator[Check]:
 def _forces(result: Analysis, unknown: Actuator) -> Iterator[Check]:
     """The unknown force in either sense, on the way from start to end and back."""
     n, limits = result.model.number, result.definition.optimise
-    least, most = force_range(result)
+    least, most = either_way(result, "force")
     acts = unknown.acts if isinstance(unknown, Cylinder) else "push"
     wanted = limits.available_force if limits is not None else None
     most_wanted = np.inf if wanted is None else n(wanted)
@@ -77,9 +76,8 @@ def _forces(result: Analysis, unknown: Actuator) -> Iterator[Check]:
         unit = quantity("force", result.definition).unit
         yield Check("available_force", result.peak_force, most_wanted, "below", unit, note)
     if isinstance(unknown, AirSpring) and unknown.supply_pressure is not None:
-        found = [result.extremes(k) for k in ("pressure", "pressure_back") if k in result.output]
-        limit, note = n(unknown.supply_pressure), "largest pressure that is needed"
-        yield Check("available_pressure", max(f.most for f in found), limit, "below", "Pa", note)
+        needed, note = either_way(result, "pressure")[1], "largest pressure that is needed"
+        yield Check("available_pressure", needed, n(unknown.supply_pressure), "below", "Pa", note)
     if isinstance(unknown, Cylinder | AirSpring) and acts != "both":
         name, words = ("pulls", "push") if acts == "push" else ("pushes", "pull")
         note = f"least force: it can only {words}"
@@ -89,18 +87,10 @@ def _forces(result: Analysis, unknown: Actuator) -> Iterator[Check]:
         yield Check("runs_ahead", runs_ahead(result), 0.0, "above", "N", note)
 
 
-def force_range(result: Analysis) -> tuple[float, float]:
-    """Least and largest unknown force, with friction on the way and on the way back."""
-    found = [result.extremes(k) for k in ("force", "force_back") if k in result.output]
-    return min(f.least for f in found), max(f.most for f in found)
-
-
 def runs_ahead(result: Analysis) -> float:
     """Least force in the sense in which its point moves; negative where the load drives."""
-    solve = result.definition.solve
-    assert solve is not None
-    unknown = result.definition.actuators[solve.unknown]
-    along = np.sign(unit_work(result.motion, unknown)[0]) * result.model.sense
+    work = unit_work(result.motion, result.definition.held_by)
+    along = np.sign(work[0]) * result.model.sense
     force = result.extremes("force")
     return _sign(force.least if along > 0.0 else -force.most, result)
 

@@ -108,13 +108,12 @@ def _held(dense: Motion, work: float) -> tuple[float, float]:
     The pressure is the stated one, or that of the force.
     """
     definition = dense.model.definition
-    contact, solve_for = definition.contact, definition.solve
+    contact = definition.contact
     assert contact is not None
-    assert solve_for is not None
     at = solve(dense.model, [work])
     wanted = dense.model.number(contact.force) * height_of(at)[1] - forces.generalised_force(at)
-    force = wanted / forces.unit_work(at, definition.actuators[solve_for.unknown])
-    pressure, stated = forces.pressure_for(at, solve_for.unknown, force)[0], contact.pressure
+    force = wanted / forces.unit_work(at, definition.held_by)
+    pressure, stated = forces.pressure_for(at, definition.unknown, force)[0], contact.pressure
     automatic = isinstance(stated, Expression) and bool(stated.names & definition.automatic)
     if stated != AUTO and not automatic:
         pressure = dense.model.number(stated)
@@ -127,14 +126,14 @@ def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> C
     `(F w + Q)/y'` with the actuator's force F at the pressure held and the work w of a unit of it.
     """
     definition = dense.model.definition
-    if definition.contact is None or definition.solve is None:
+    if definition.contact is None:
         return None
-    unknown = definition.solve.unknown
+    unknown = definition.unknown
     pressure, needed = _held(dense, at_zone["work"])
 
     def generalised(positions: Motion, friction: int) -> Any:
         push = forces.force_at_pressure(positions, unknown, pressure, needed)
-        work = forces.unit_work(positions, definition.actuators[unknown])
+        work = forces.unit_work(positions, definition.held_by)
         return push * work + forces.generalised_force(positions, forces.Rates(friction=friction))
 
     def force(positions: Motion, way: int) -> Floats:

@@ -91,14 +91,13 @@ class Judge:
 
     def __init__(self, definition: Mechanism, every: int = 1) -> None:
         assert definition.optimise is not None
-        assert definition.solve is not None
         self.definition = definition
         self.wanted: Optimise = definition.optimise
         self.names = list(self.wanted.bounds)
         self.values = parameter_values(definition)
         bounds = [[number(b, self.values) for b in self.wanted.bounds[n]] for n in self.names]
         self.lower, self.upper = np.array(bounds, dtype=float).T
-        self.unknown = definition.actuators[definition.solve.unknown]
+        self.unknown = definition.held_by
         self.pair = length_points(definition)
         self.output = definition.output.point if definition.output is not None else None
         kind = self.wanted.objective

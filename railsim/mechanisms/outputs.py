@@ -76,7 +76,7 @@ def outputs(motion: Motion) -> dict[str, Any]:
                 ratios = (r1[:, k] / found["rate"] for k in (model.axis, 0))
                 found["ratio"], found["ratio_x"] = ratios
     if definition.solve is not None:
-        found |= _forces(motion, definition.solve.unknown)
+        found |= _forces(motion, definition.unknown)
     for name, element in definition.elements.items():
         pair = ends(element)
         if pair is not None:
@@ -130,13 +130,12 @@ def check_pressure(motion: Motion, output: Mapping[str, Any]) -> None:
     missing = np.flatnonzero(~np.isfinite(output.get("pressure", 0.0)))
     if len(missing):
         definition, k = motion.model.definition, missing[0]
-        assert definition.solve is not None
-        spring = definition.actuators[definition.solve.unknown]
+        spring = definition.held_by
         assert isinstance(spring, AirSpring)
         height = float(motion.length(spring.air_spring)[0][k])
         reason = forces.table_of(motion, spring).reason(height, float(output["force"][k]))
         where = f"driver at {driver_words(motion.model, float(motion.s[k]))}: {reason}"
-        key = f"actuators.{definition.solve.unknown}"
+        key = f"actuators.{definition.unknown}"
         raise motion.model.refusal(key, where, "another range or table")
 
 

@@ -33,7 +33,7 @@ def quantity(name: str, definition: Mechanism) -> Column:
         unit, shown = ("mm/rad", ".3f") if angular else ("", ".4f")
         return Column(name, "length over the driver, derivative", unit, shown)
     if name in ("force", "force_back") and definition.solve is not None:
-        unit = force_unit(definition.solve.unknown, definition)
+        unit = force_unit(definition.unknown, definition)
         way = " on the way back" if name == "force_back" else ""
         words = f"{'torque' if unit == 'N m' else 'force'} of the unknown actuator{way}"
         return Column(name, words, unit, ".3f" if unit == "N m" else ".2f")
@@ -53,5 +53,5 @@ def force_unit(actuator: str, definition: Mechanism) -> str:
 
 def force_units(definitions: Iterable[Mechanism]) -> str:
     """Unit of the unknown forces of mechanisms; where they differ, each of them."""
-    units = {force_unit(one.solve.unknown, one) for one in definitions if one.solve is not None}
+    units = {force_unit(one.unknown, one) for one in definitions if one.solve is not None}
     return " or ".join(sorted(units)) or "N"

@@ -37,15 +37,14 @@ def _zone(result: Analysis) -> list[str]:
 
 def _forces(result: Analysis) -> list[str]:
     """A hand that has to hold back."""
-    solve_for = result.definition.solve
-    if solve_for is None:
+    definition = result.definition
+    if definition.solve is None:
         return []
-    unknown = result.definition.actuators[solve_for.unknown]
     least = runs_ahead(result)
-    if not isinstance(unknown, parts.HandForce | parts.HandTorque) or least >= 0.0:
+    if not isinstance(definition.held_by, parts.HandForce | parts.HandTorque) or least >= 0.0:
         return []
-    unit = force_unit(solve_for.unknown, result.definition)
-    return [f"'{solve_for.unknown}' holds back with up to {-least:.2f} {unit}: the load runs ahead"]
+    hand, unit = definition.unknown, force_unit(definition.unknown, definition)
+    return [f"'{hand}' holds back with up to {-least:.2f} {unit}: the load runs ahead"]
 
 
 def _rods(result: Analysis) -> list[str]:

@@ -9,8 +9,7 @@ import numpy as np
 from railsim.definitions.mechanism.definition import CatalogueRow
 from railsim.definitions.mechanism.parts import Cylinder, GasSpring
 from railsim.design_checks import ROUNDING
-from railsim.mechanisms.analysis import Analysis
-from railsim.mechanisms.checks import force_range
+from railsim.mechanisms.analysis import Analysis, either_way
 from railsim.mechanisms.components import gas_temperature_factor, next_size
 from railsim.mechanisms.forces import Rates, actuator_force
 from railsim.mechanisms.kinematics import Motion
@@ -36,7 +35,7 @@ def selection(result: Analysis) -> list[Choice]:
     found: list[Choice] = []
     definition = result.definition
     if definition.solve is not None:
-        unknown = definition.actuators[definition.solve.unknown]
+        unknown = definition.held_by
         found += _cylinders(result, unknown) if isinstance(unknown, Cylinder) else []
     for wanted in definition.selection:
         element = definition.elements[wanted.element]
@@ -49,7 +48,7 @@ def selection(result: Analysis) -> list[Choice]:
 def needed_bore(result: Analysis, cylinder: Cylinder) -> float:
     """Smallest bore that gives the largest force of each chamber at the supply pressure [m]."""
     n = result.model.number
-    least, most = force_range(result)
+    least, most = either_way(result, "force")
     rod = n(cylinder.rod)
     chambers = {"push": [(most, 0.0)], "pull": [(most, rod)], "both": [(most, 0.0), (-least, rod)]}
     bores = [0.0]
@@ -64,7 +63,7 @@ def _cylinders(result: Analysis, cylinder: Cylinder) -> list[Choice]:
     bore, stroke = needed_bore(result, cylinder), result.stroke
     shortest = result.extremes("length").least
     made = next_size([n(s) for s in cylinder.strokes], stroke)
-    least, _ = force_range(result)
+    least, _ = either_way(result, "force")
     wrong = cylinder.acts != "both" and -least > ROUNDING * result.peak_force
     found = []
     for size in (n(b) for b in cylinder.bores):
@@ -197,7 +196,6 @@ def _unknown_forces(
 ) -> list[Any]:
     """The unknown force, way and back, with another gas spring; all have the same temperature."""
     definition = result.definition
-    assert definition.solve is not None
     elements = {**definition.elements, name: spring}
     for key, part in elements.items():
         if isinstance(part, GasSpring):
@@ -205,4 +203,4 @@ def _unknown_forces(
     model = replace(result.model, definition=definition.model_copy(update={"elements": elements}))
     motion: Motion = replace(result.motion, model=model, known={})
     rates = [Rates(friction=way, trial=True) for way in (1, -1)]
-    return [actuator_force(motion, definition.solve.unknown, one) for one in rates]
+    return [actuator_force(motion, definition.unknown, one) for one in rates]

@@ -170,7 +170,6 @@ def sentences(result: Analysis) -> list[str]:
 
 def _force_sentence(result: Analysis, driver: Callable[[float], str]) -> str:
     """Least and largest unknown force, on the way back too where there is friction."""
-    assert result.definition.solve is not None
     unit = quantity("force", result.definition).unit
     found = []
     for name, words in (("force", ""), ("force_back", "on the way back ")):
@@ -179,7 +178,7 @@ def _force_sentence(result: Analysis, driver: Callable[[float], str]) -> str:
             low, high = (f"{force:z.2f} {unit} at" for force in (ends.least, ends.most))
             found.append(f"{words}{low} {driver(ends.least_at)} to {high} {driver(ends.most_at)}")
     largest = f"largest amount {result.peak_force:.2f} {unit}"
-    return f"force of '{result.definition.solve.unknown}' {'; '.join(found)}; {largest}"
+    return f"force of '{result.definition.unknown}' {'; '.join(found)}; {largest}"
 
 
 def _contact_sentences(contact: Contact) -> list[str]:

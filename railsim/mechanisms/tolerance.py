@@ -62,10 +62,10 @@ def sensitivities(
             for i, label in enumerate(at):
                 add(f"ratio_{label}", "1", ratio[:, i])
     if definition.solve is not None:
-        work = unit_work(motion, definition.actuators[definition.solve.unknown])
+        work = unit_work(motion, definition.held_by)
         force = -generalised_force(motion, Rates(friction=model.sense)) / work
         for i, label in enumerate(at):
-            unit = force_unit(definition.solve.unknown, definition)
+            unit = force_unit(definition.unknown, definition)
             add(f"force_{label}", unit, force[:, i])
     return found
 

@@ -326,8 +326,7 @@ def contact_figure(result: Analysis) -> Figure:
 @style.styled()
 def carpet_figure(result: Analysis) -> Figure:
     """Carpet of the air spring: force over height and pressure, with the mechanism's load."""
-    assert result.definition.solve is not None
-    spring = result.definition.actuators[result.definition.solve.unknown]
+    spring = result.definition.held_by
     assert isinstance(spring, AirSpring)
     table = table_of(result.motion, spring)
     figure, axes = style.single(6.6, 4.2)
@@ -388,13 +387,12 @@ def cases_figure(results: Mapping[str, Analysis]) -> Figure:
     """Unknown force over the driver, for all cases of a mechanism."""
     figure, axes = style.single(6.6, 3.6)
     first = next(iter(results.values()))
-    assert first.definition.solve is not None
     for i, (name, result) in enumerate(results.items()):
         travel, force = values_of("travel", result), values_of("force", result)
         axes.plot(travel, force, label=name, **line_style(i))
     axes.axhline(0.0, color="0.4", lw=0.8)
     axes.set(xlabel=label_of("travel", first, "driver"))
-    axes.set(ylabel=label_of("force", first, f"force of '{first.definition.solve.unknown}'"))
+    axes.set(ylabel=label_of("force", first, f"force of '{first.definition.unknown}'"))
     axes.legend()
     return figure
 

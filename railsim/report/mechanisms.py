@@ -107,7 +107,7 @@ def figures(collected: Collected) -> dict[str, Figure]:
     result, optimum = collected.result, collected.optimum
     definition, output = result.definition, result.output
     compared = _compared(collected) if "ratio" in output or result.zone else {}
-    solved = definition.actuators[definition.solve.unknown] if definition.solve else None
+    solved = definition.held_by if definition.solve else None
     compares = bool(compared) and "ratio" in output
     held = any("pressure" in one.output for one in compared.values())
     cams = any(hasattr(joint, "cam") for joint in definition.joints.values())

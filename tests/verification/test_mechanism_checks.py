@@ -341,10 +341,7 @@ def forces(kind, least, most, back=None, turns=1.0, sense=1, optimise=None, **pa
     amounts = [abs(x) for pair in values.values() for x in pair]
     result = SimpleNamespace(
         model=SimpleNamespace(number=float, sense=sense), output=values, motion=None,
-        definition=SimpleNamespace(
-            optimise=optimise, solve=SimpleNamespace(unknown="lift"),
-            actuators={"lift": None},
-        ),
+        definition=SimpleNamespace(optimise=optimise, held_by=None),
         extremes=lambda name: SimpleNamespace(least=values[name][0], most=values[name][1]),
         peak_force=max(amounts),
     )  # fmt: skip
@@ -354,7 +351,7 @@ def forces(kind, least, most, back=None, turns=1.0, sense=1, optimise=None, **pa
             "railsim.mechanisms.checks.chamber_area",
             lambda model, part, acting: {"push": 0.02, "pull": 0.015}[acting],
         )
-        result.definition.actuators["lift"] = unknown = kind.model_construct(**part)
+        result.definition.held_by = unknown = kind.model_construct(**part)
         return {one.name: (one.value, one.limit, one.sense) for one in _forces(result, unknown)}
 
 
@@ -394,7 +391,10 @@ def test_a_hand_that_has_to_hold_back_is_remarked(monkeypatch, kind, least):
     """A cylinder is not, its check `runs_ahead` says so; a torque has its own unit."""
     monkeypatch.setattr("railsim.mechanisms.remarks.runs_ahead", lambda _: least)
     definition = SimpleNamespace(
-        solve=SimpleNamespace(unknown="grip"), actuators={"grip": kind.model_construct()}
+        solve=True,
+        unknown="grip",
+        held_by=kind.model_construct(),
+        actuators={"grip": kind.model_construct()},
     )
     found = held_back(SimpleNamespace(definition=definition))
     unit = "N m" if kind is HandTorque else "N"

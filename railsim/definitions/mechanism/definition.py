@@ -357,6 +357,17 @@ class Mechanism(FileDefinition):
         return self.with_parameters(self.cases[case])
 
     @property
+    def unknown(self) -> str:
+        """Name of the actuator whose force holds the mechanism; only where there is `[solve]`."""
+        assert self.solve is not None
+        return self.solve.unknown
+
+    @property
+    def held_by(self) -> parts.Actuator:
+        """The unknown actuator itself."""
+        return self.actuators[self.unknown]
+
+    @property
     def automatic(self) -> set[str]:
         """Parameters that are left to the program."""
         return {name for name, value in self.parameters.items() if value == parts.AUTO}
