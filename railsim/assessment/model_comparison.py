@@ -246,9 +246,7 @@ class ModelValidation:
     def of(cls, record: Mapping[str, Any]) -> "ModelValidation":
         """Return a comparison from its `record`: all but the channels over the arc length.
 
-        Raises
-        ------
-        KeyError, TypeError : the record of something else.
+        Raises KeyError, TypeError: the record of something else.
         """
         pairs: dict[str, list[Pair]] = {}
         for row in record["sections"]:

@@ -80,10 +80,7 @@ class FileDefinition(Definition):
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the definition as a file, which appears when it is whole.
 
-        Raises
-        ------
-        InputError
-            The file exists or cannot be written.
+        Raises InputError: the file exists or cannot be written.
         """
         path = Path(path)
         check_file(path, overwrite=overwrite, endings=[".toml"])

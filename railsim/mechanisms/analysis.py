@@ -140,10 +140,7 @@ class Analysis:
 
         Of a stretch on which it keeps the value, the first position.
 
-        Raises
-        ------
-        InputError
-            There is no such result, or it never has this value.
+        Raises InputError: there is no such result, or it never has this value.
         """
         self.result(quantity)
         dense, known = self._dense[0], self._dense[1][quantity]

@@ -104,9 +104,7 @@ def driving(definition: written.Mechanism) -> str:
 def driven_motion(whole: Motion) -> TimedMotion:
     """Inverse dynamics along the file's motion law, from dense positions over the whole range.
 
-    Raises
-    ------
-    InputError : the law leaves the range; a dead point of the driving actuator.
+    Raises InputError: the law leaves the range; a dead point of the driving actuator.
     """
     model = whole.model
     law = model.definition.motion

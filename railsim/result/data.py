@@ -365,10 +365,7 @@ class Result:
     def to_hdf5(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the result file; it appears under its name only when it is whole.
 
-        Raises
-        ------
-        InputError
-            The file exists and may not be overwritten, or cannot be written.
+        Raises InputError: the file exists and may not be overwritten, or cannot be written.
         """
         from railsim.result.hdf5 import write  # the layout of the file is built on this module
 
@@ -380,10 +377,7 @@ class Result:
     def to_xarray(self) -> "xarray.Dataset":
         """Return the arrays as an `xarray.Dataset` with named coordinates and units.
 
-        Raises
-        ------
-        ImportError
-            Xarray is not installed.
+        Raises ImportError: xarray is not installed.
         """
         package = optional_package("xarray", "to_xarray", "'railsim[xarray]'")
         variables = {}

@@ -183,9 +183,7 @@ class Simulation:
 
         The end of the run shortens the last call; a step that would begin beyond it is an error.
 
-        Raises
-        ------
-        InputError : the run has ended, or `dt` is no positive time.
+        Raises InputError: the run has ended, or `dt` is no positive time.
         """
         if not self.running:
             raise argument_error("step", self._ended_because(), "a new Simulation")
@@ -350,10 +348,8 @@ class Simulation:
     def set(self, actuator: str, value: float) -> None:
         """Give a command to an actuator; it stays until the next one.
 
-        Raises
-        ------
-        InputError : no such actuator, or one that a controller commands; no finite number; too many
-            commands on their way to an actuator with a delay; the result has been taken.
+        Raises InputError: no such actuator, or one that a controller commands; no finite number;
+        too many commands on their way to an actuator with a delay; the result has been taken.
         """
         self._check_open("set")
         check_command(self._vehicle, "actuator", actuator, self.actuators)
@@ -408,9 +404,7 @@ class Simulation:
 
         Quantities are arrays without the dimension of time, such as ``Q`` by wheelset and side.
 
-        Raises
-        ------
-        InputError : there is nothing of this name.
+        Raises InputError: there is nothing of this name.
         """
         signals, values = self._run.prepared.model.index.signals, self._present()
         if name == "Q0":  # which has no dimension of time

@@ -78,9 +78,7 @@ class Outcome:
     def to_dataframe(self) -> "pandas.DataFrame":
         """Return the summary, one row per run, as a `pandas.DataFrame` [SI].
 
-        Raises
-        ------
-        ImportError : pandas is not installed.
+        Raises ImportError: pandas is not installed.
         """
         pandas = optional_package("pandas", "to_dataframe", "pandas")
         frame = pandas.DataFrame([summary_row(record) for record in self.records])
@@ -98,9 +96,7 @@ class Outcome:
         Dimensions are the parameters that differ between the runs; if these do not form a full
         grid, as in a sample, the dimension is ``run``.  Each variable has its ``units``.
 
-        Raises
-        ------
-        ImportError : pandas or xarray is not installed.
+        Raises ImportError: pandas or xarray is not installed.
         """
         package = optional_package("xarray", "to_xarray", "'railsim[xarray]'")
         frame = self.to_dataframe()
