@@ -13,7 +13,7 @@ from railsim.definitions.mechanism.parts import Cam
 from railsim.definitions.mechanism.values import body_name
 from railsim.errors import InputError
 from railsim.kernels import linkage as kernel
-from railsim.kernels import linkage_motion as motion_kernel
+from railsim.mechanisms.assembly import constraints
 from railsim.mechanisms.kinematics import Motion, solve
 
 HALVINGS = 48
@@ -66,18 +66,16 @@ def _transition(dense: Motion, joint: str, row: int, k: int) -> Transition:
         else:
             high = middle
     at = solve(model, [low])
-    arcs = np.repeat(at.arcs, 2, axis=0)
-    arcs[:, row] = before, after
-    n = 3 * model.linkage.n_bodies
-    residual, jacobian = np.zeros((2, n)), np.zeros((2, n, n))
-    twice = np.repeat(at.q, 2, axis=0)
-    motion_kernel.jacobians(model.linkage, np.array([low, low]), twice, arcs, residual, jacobian)
-    unit = np.zeros((2, n, 1))
-    unit[:, -1] = 1.0
-    rates = np.linalg.solve(jacobian, unit)[:, 3 * (roller_body(dense, joint) - 1) + 2, 0]
+    turn = 3 * (roller_body(dense, joint) - 1) + 2
+    rates, unit = [], np.eye(3 * model.linkage.n_bodies)[-1]  # of the driver
+    for arc in (before, after):
+        arcs = at.arcs[0].copy()
+        arcs[row] = arc
+        residual, jacobian = constraints(model, low, at.q[0], arcs)
+        rates.append(float(np.linalg.solve(jacobian, unit)[turn]))
     earlier = int(model.linkage.joint[row, 4]) - 1
-    gap = abs(float(residual[1, model.linkage.joint[row, 3]]))
-    return Transition(joint, low, before - earlier, after - earlier, gap, *rates.tolist())
+    gap = abs(float(residual[model.linkage.joint[row, 3]]))
+    return Transition(joint, low, before - earlier, after - earlier, gap, *rates)
 
 
 def on_one_arc(motion: Motion, row: int, arc: int, beyond: float) -> Motion | None:
