@@ -26,9 +26,9 @@ from railsim.arrays import Complexes, Floats
 from railsim.errors import ModelError
 
 SETTLED = 1e-6  # last change of Newton's method, in scaled units
-MOST_ITERATIONS = 20
+MOST_ITERATIONS = 40
 MOST_MATRICES = 4  # formed until then; each costs as much as the flow of all components
-SLOW = 0.6  # ratio of two changes from which on the matrix, else updated, is formed again
+SLOW = 1.0  # ratio of two changes from which on the matrix, else updated, is formed again
 QUICK = 8  # iterations after which the next step may be longer
 DIFFERENCE = 1e-5  # of the difference quotients, in scaled units
 MULTIPLIER = 1e-3  # by which a multiplier may exceed 1: error of difference quotients
