@@ -33,7 +33,9 @@ STEP_DOWN = 0.95  # ratio of speeds, where every disturbance ends in a derailmen
 # Where further ramps begin above a speed at which rest is unstable: shares of a tenth of it, or of
 # what is left to the end of hunting; the range may be narrow.
 ONWARDS, ABOVE = (0.5, 0.1), 0.1
-BELOW = 0.8  # ratio of speeds at which other motions are sought below the slowest one
+# Ratios of speeds at which other motions are sought below the slowest one: two that differ little,
+# such as on the flange with 6.5 and 6.7 mm, may end 7 % apart.
+CLOSE, BELOW = 0.95, 0.8
 
 
 def excited(motion: Motion, speed: float, amplitude: float) -> Stretch:
@@ -141,14 +143,16 @@ def below(
     Where one motion ends rounding may decide whether the vehicle changes to another.  From each
     that is found a ramp goes on: yields its slowest motion, and the amplitude on it.
     """
-    while (speed := BELOW * speed) > low:
+    ratio = CLOSE
+    while (tried := ratio * speed) > low:
+        ratio = BELOW * (1.0 if ratio == CLOSE else ratio)
         with suppress(LeftRange):  # every disturbance derails, or what it becomes
-            seen = excited(motion, speed, excitation)
-            if seen.amplitude > THRESHOLD and sustained(motion, seen.state, speed):
-                lowest, branch = ramp(motion, low, speed, excitations=(excitation,))
+            seen = excited(motion, tried, excitation)
+            if seen.amplitude > THRESHOLD and sustained(motion, seen.state, tried):
+                lowest, branch = ramp(motion, low, tried, excitations=(excitation,))
                 if lowest is not None:
                     yield lowest, branch
-                    speed = lowest.speed
+                    speed, ratio = lowest.speed, CLOSE
 
 
 def _brake(

@@ -211,6 +211,27 @@ def test_motions_below_the_end_of_a_ramp_are_found_though_rest_is_stable_there()
     assert found.remarks == []
 
 
+def test_a_motion_that_ends_little_below_another_one_is_found():
+    """What is excited at 70 m/s ends at 60, what a disturbance becomes below that ends at 55.5."""
+
+    class Two(Cycles):
+        other = False
+
+        def rest(self, speed, amplitude):
+            self.other = speed < 65.0
+            return super().rest(speed, amplitude)
+
+        def stretch(self, state, begin, end, duration):
+            self.growth = lambda v: 1.0 if v > (55.5 if self.other else 60.0) else -1.0
+            return super().stretch(state, begin, end, duration)
+
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=70.0)
+    begins = LossOfStability(None, False, ())
+    _by_ramp(found, Two(None, 5.0), begins, None, (3e-3,), lambda _: None)
+    assert found.branches[0].end == pytest.approx(60.0, abs=0.2)
+    assert found.nonlinear["ramp"].speed == pytest.approx(55.5, abs=0.2)
+
+
 def test_a_ramp_begins_with_what_a_small_motion_grows_to():
     """Below 15 m/s, down to 13, only more than 0.3 mm lasts; 0.1 mm grows to 0.45 in 100 s."""
 
