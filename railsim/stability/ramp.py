@@ -29,6 +29,7 @@ WHOLE = 4.0  # s, of a look at a motion too slow to be seen whole in a shorter o
 CONSTANT = 20.0  # s, of a run that decides whether an oscillation sustains itself
 CHANGE = 0.02  # of the amplitude over half of it
 MOST_HALVES = 10  # halves of such a run, at most
+MOST_GROWING = 30  # times HOLD, in which a motion grows to what it is led from, at most
 STEP_DOWN = 0.95  # ratio of speeds, where every disturbance ends in a derailment
 # Where further ramps begin above a speed at which rest is unstable: shares of a tenth of it, or of
 # what is left to the end of hunting; the range may be narrow.
@@ -68,7 +69,7 @@ def grown(motion: Motion, seen: Stretch, speed: float) -> Stretch:
     A ramp from a motion far smaller than that dies at speeds at which the grown one lasts.
     """
     with suppress(LeftRange):
-        for _ in range(MOST_HALVES):
+        for _ in range(MOST_GROWING):
             further = motion.stretch(seen.state, speed, speed, HOLD)
             further = motion.stretch(further.state, speed, speed, 2.0 * WINDOW)
             if further.amplitude <= (1.0 + CHANGE) * seen.amplitude:
