@@ -14,6 +14,7 @@ from railsim.kernels.check_rails import CHECK_ROW, CHECK_WHEEL, FIRST, LAST
 from railsim.profiles.profile import Profile
 
 SPACING = 1e-4  # m, of the heights at which both contours are compared
+USUAL_YAW = 0.015  # rad, at which the disc reaches as far as the flange
 
 
 class CheckRails(NamedTuple):
@@ -72,6 +73,8 @@ def flange_back(
 
     The contour of the flange goes on upwards from the end of its profile, parallel to the wheel's
     plane.  Contours are compared between the top of the check rail and the tip of the flange.
+    With psi the yaw the circle of the radius r meets the height h of the face x ahead of the axle,
+    x^2 = r^2 - h^2, so that the clearance is the least of own(r) - face(h) - psi x over r >= h.
     """
     side = 0 if rail.rail == "left" else 1
     wheel = profiles[wheelset.profile[side]]
@@ -92,6 +95,10 @@ def flange_back(
     first = int(np.argmax(clearance <= clearance.min() + 1e-6))
     tape, radius = tape_circle_position(wheelset.back_to_back), wheelset.radius[side]
     below = radius + float(heights[first])
-    reach = float(np.sqrt(max((radius + float(wheel.z[tip])) ** 2 - below**2, 0.0)))
+    # a yawed flange touches with a larger circle, where it is rounded already
+    r = radius + heights
+    ahead = np.sqrt(np.maximum(r[:, None] ** 2 - r**2, 0.0))
+    yawed = np.where(np.tri(r.size, dtype=bool), own[:, None] - face - USUAL_YAW * ahead, np.inf)
+    reach = float(clearance[first] - yawed.min()) / USUAL_YAW
     back = float(own[first]) + tape
     return float(clearance[first]) + tape - 0.5 * gauge, below, reach, back

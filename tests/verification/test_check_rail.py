@@ -34,9 +34,8 @@ def clearance(back_to_back, gauge):
     profile = tuple((1e-3 * y, 1e-3 * z) for y, z in FACE)
     # the face is 76.00 mm inside of y = 0 of the rail, its gauge face 35.00 mm
     rail = CheckRail(rail="right", flangeway=0.041, profile=profile)
-    offset, below, reach, back = flange_back(wheelset, rail, gauge, profiles)
+    offset, below, _, back = flange_back(wheelset, rail, gauge, profiles)
     assert below == pytest.approx(0.46 + 0.0135, abs=1e-3)
-    assert reach == pytest.approx(np.sqrt(0.488**2 - below**2), rel=1e-6)
     assert back == pytest.approx(0.5 * back_to_back + 0.07 - 0.06961, abs=5e-4)
     return 1e3 * (offset + 0.041)
 
@@ -47,6 +46,35 @@ def clearance(back_to_back, gauge):
 )
 def test_first_contact(back_to_back, gauge, expected):
     assert clearance(back_to_back, gauge) == pytest.approx(expected, abs=0.08)
+
+
+def penetration(yaw, contour):
+    """How far yaw pushes the back of an S1002 wheel into a face of this contour, point by point."""
+    wheel, angle = load_profile("S1002"), np.linspace(-0.6, 0.6, 1201)[:, None]
+    tip = int(np.argmax(wheel.z))
+    radius = 0.46 + np.linspace(-0.03, wheel.z[tip], 500)
+    back = np.interp(radius - 0.46, wheel.z[: tip + 1], wheel.y[: tip + 1])
+    height = radius * np.cos(angle) - 0.46  # under the top of the check rail
+    face = np.interp(height, *np.transpose(contour)[::-1])
+
+    def least(yaw):
+        away = np.cos(yaw) * back - np.sin(yaw) * radius * np.sin(angle) - face
+        return np.min(away[height >= 0.0])
+
+    return least(0.0) - least(yaw)
+
+
+@pytest.mark.parametrize("yaw", [0.005, 0.01, 0.018])
+@pytest.mark.parametrize("rounded", [False, True])
+def test_yaw_brings_the_rounded_flange_as_near_as_its_points(rounded, yaw):
+    """Within 0.1 mm; a disc as large as the tip of the flange would reach 0.3 to 1.9 mm further."""
+    profile = tuple((1e-3 * y, 1e-3 * z) for y, z in FACE) if rounded else None
+    rail = CheckRail(rail="right", flangeway=0.041, profile=profile)
+    wheelset = flatten(load_vehicle("coach_manchester")).of_kind("wheelset")[0].wheelset
+    known = {name: load_profile(name) for name in wheelset.profile}
+    _, _, reach, _ = flange_back(wheelset, rail, 1.435, known)
+    found = penetration(yaw, profile or [(0.0, 0.0), (0.0, 0.1)])
+    assert reach * yaw == pytest.approx(found, abs=1e-4)
 
 
 def curve(rails=(), **more):
@@ -88,10 +116,10 @@ def test_check_rail_relieves_the_outer_rail_in_a_sharp_curve():
         for result, extra in ((plain, 0.0), (guided, force[:, :, 1].sum(axis=1)))
     ]
     assert total[1] == pytest.approx(total[0], rel=0.02)
-    # the back slides down ahead of the axle, at V x_c/r, up to the edge of the disc
+    # the back slides down ahead of the axle, at V x_c/r, where its rounding begins
     wear = guided["check_rail_T_gamma"][at_end, 0, 1].mean()
-    reach = np.sqrt((0.46 + 0.028) ** 2 - 0.46**2) / 0.46
-    assert 0.9 * 0.3 * N * reach < wear < 1.02 * 0.3 * N * reach
+    first, last = (np.sqrt((0.46 + z) ** 2 - 0.46**2) / 0.46 for z in (9.5e-3, 12e-3))
+    assert 0.3 * N * first < wear < 0.3 * N * last
 
 
 @pytest.mark.parametrize("right", [-1.0, 1.0])
