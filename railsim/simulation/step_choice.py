@@ -257,8 +257,8 @@ def class_speed(speed: float) -> float:
     [18.49, 18.49, 18.49, 22.19]
     """
     lowest: float = CLASS ** math.floor(math.log(speed, CLASS))
-    # below a standstill there is no steady rolling
-    return min(speed, max(lowest, 1.02 * STANDSTILL_SPEED))
+    # at a standstill, which ends the run, there is no steady rolling
+    return max(lowest, 1.02 * STANDSTILL_SPEED)
 
 
 def with_class_friction(model: Model, *, least: bool = False) -> Model:

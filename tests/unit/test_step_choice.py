@@ -69,6 +69,14 @@ def test_longer_steps_on_rigid_rails_below_the_critical_speed(speed, changes, st
     assert steps.at(speed)[0] == pytest.approx(step)
 
 
+def test_a_run_that_brakes_has_a_step_until_the_loop_finds_it_at_a_standstill():
+    """There is no steady rolling at 0.05 m/s; outputs need not fall on the moment before."""
+    settings = Settings.model_validate({"drive": {"mode": "free"}})
+    track = load_track("straight")
+    steps = prepare(load_vehicle("coach_manchester"), track, settings, 1.0, duration=1.0).steps
+    assert steps.at(0.0497) == steps.at(0.051)
+
+
 def test_dry_friction_is_followed_in_short_steps():
     """Stable at 2.5 ms, where sum_Y in R 250 m is off by 3.8 % from RK4; here 1 %."""
     vehicle, track = load_vehicle("wagon_uic_link_empty"), load_track("straight")
