@@ -378,6 +378,8 @@ class Simulation:
         ----------
         displacement, velocity : float64[wheelset, side, 2]
             Of the rail heads, lateral (right positive) and vertical (down positive) [m], [m/s].
+            The lateral velocity is that of the rail's material, against which the wheel slips,
+            the vertical one that under the moving wheel, with speed times slope.
         """
         self._check_open("set_rails")
         if self._run.system.support.elastic:
