@@ -60,3 +60,33 @@ def test_pads_return_to_their_limits_each_in_its_own_way(plain):
         plain(module)
     step_rk4.settle_limits(given, CURVES, 1, drive, state)
     assert state == pytest.approx([9.0, -1e3, 0.6e3, 0.8e3, 8e3])
+
+
+@pytest.mark.parametrize("skew", [0.0, 0.4, -0.3])
+def test_a_wedge_slides_back_to_its_limit_along_the_gradient_of_its_stiffness(skew, plain):
+    """Forces q over their limits L end on |q| - e q_z = 1, each reduced by 1 + lambda k/L^2."""
+    stiffness, limits = np.array([1e6, 3e6, 2e6]), np.array([1e3, 2e3, 1.5e3])
+    parameter = np.array([[1e6, 1.0, 0.0], [3e6, 1.0, 0.0], [2e6, 3.0, skew]])
+    given = Internal(np.full(3, PAD), parameter, np.full(3, -1))
+    trial, drive = np.array([2.5e3, -3e3, 4e3]), np.stack([np.zeros(3), limits], axis=1)
+    plain(kernel)
+    state = np.array([7.0, *trial])
+    kernel.hold_within(given, 2, 1, drive, state)
+    q = state[1:] / limits
+    assert np.linalg.norm(q) - skew * q[2] == pytest.approx(1.0)
+    slip = (trial / state[1:] - 1.0) * limits**2 / stiffness
+    assert slip == pytest.approx(np.full(3, slip[0]), rel=1e-6)
+    held = state.copy()
+    kernel.hold_within(given, 2, 1, drive, state)  # nothing is left to slide
+    assert state == pytest.approx(held)
+
+
+def test_a_table_of_several_takes_speeds_of_its_own_branches(plain):
+    """Both ends of each go on; curves follow each other without a gap."""
+    tables = Record(start=np.array([0, 4, 8]), x=np.tile(SPEEDS, 2))
+    tables.f = np.concatenate([FORCES, 2.0 * FORCES])
+    plain(kernel)
+    for force in (-4e3, -2.5e3, 0.0, 1.2e3, 1.6e3, 5e3):
+        assert kernel.curve_speed(tables, 0, force, 0.0) == pytest.approx(curve(force))
+        assert kernel.curve_speed(tables, 1, 2.0 * force, 0.0) == pytest.approx(curve(force))
+        assert kernel.curve_value(tables, 1, curve(force)) == pytest.approx(2.0 * force)

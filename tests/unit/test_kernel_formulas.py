@@ -6,15 +6,19 @@ from types import SimpleNamespace as Record
 import numpy as np
 import pytest
 from dynamics import rotation as turn
+from scipy.integrate import trapezoid
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import approx_fprime
 from scipy.signal import butter
+from scipy.spatial.transform import Rotation
 
 from railsim.kernels import (
     contact_table,
     controllers,
     creepages,
     driving,
+    elastic_patch,
+    elements,
     rail_parts,
     rhs,
     rotation,
@@ -52,18 +56,30 @@ from railsim.kernels.contact_columns import (
 )
 from railsim.kernels.contact_table import G_ROLL, G_Y, LOOK_UP_SIZE
 from railsim.kernels.rails import (
+    ASIDE,
     COSINE,
     MIDDLE_Y,
     MIDDLE_Z,
     MOTION_Y_RATE,
     MOTION_Z_RATE,
     RAIL_SLOPE,
+    ROLL,
     ROLL_SLOPE,
     SINE,
     SLOPE_Z,
 )
-from railsim.kernels.state import ARC_LENGTH
-from railsim.kernels.system import COS_ROLL, FORCE, FREE, MOMENT, POSE_SIZE, SIN_ROLL, Y_0, Z_0
+from railsim.kernels.state import ARC_LENGTH, velocity_begin
+from railsim.kernels.system import (
+    COS_ROLL,
+    FORCE,
+    FREE,
+    MOMENT,
+    POSE_SIZE,
+    RADIUS,
+    SIN_ROLL,
+    Y_0,
+    Z_0,
+)
 from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA, PSI, TrackTables
 from railsim.kernels.track_frame import PHI as CANT_ANGLE
 
@@ -85,6 +101,32 @@ def test_angles_of_eight_lanes_are_those_of_numpy(plain):
         sine, cosine = rotation.sine_cosine_lanes(x)
         np.testing.assert_allclose(sine, np.sin(x), rtol=2e-15)
         np.testing.assert_allclose(cosine, np.cos(x), rtol=2e-15)
+
+
+def test_moment_of_a_bushing_is_the_gradient_of_its_potential(plain):
+    """tr(K_d (1 - R_1^T R_2)) of large rotations; the damper takes the rate in body 1's axes."""
+    random, stiffness = np.random.default_rng(14), np.array([3.0, 5.0, 11.0])
+    R1, R2 = Rotation.random(2, random_state=3)
+    omega_1, omega_2, damping = random.normal(size=(3, 3))
+
+    def potential(turned):
+        part = (R1 * Rotation.from_rotvec(turned)).as_matrix().T @ R2.as_matrix()
+        return stiffness @ (1.0 - np.diag(part))
+
+    plain(elements)
+    axes = R1.as_matrix(), R2.as_matrix()
+    angle, rate, moment = elements.rotation_law(
+        axes[0].ravel(), axes[1].ravel(), omega_1, omega_2, (stiffness, damping)
+    )
+    assert rate == pytest.approx(axes[0].T @ (omega_2 - omega_1))
+    spring = -approx_fprime(np.zeros(3), potential)
+    assert moment == pytest.approx(spring + damping * rate, abs=1e-6)
+    assert angle == pytest.approx(np.sin((R1.inv() * R2).magnitude()) * direction(R1.inv() * R2))
+
+
+def direction(rotation):
+    """Axis of a rotation."""
+    return rotation.as_rotvec() / rotation.magnitude()
 
 
 X = np.array([1.0, 0.0, 0.0])
@@ -332,6 +374,32 @@ def test_gap_of_a_wheel_that_is_not_round_has_the_slopes_of_its_height():
     assert look_up[2 + np.array([0, G_Y, G_ROLL])] == pytest.approx(expected, abs=1e-6)
 
 
+def test_foreseen_height_of_a_wheel_changes_as_the_wheel_turns(plain):
+    """Over time, at the wheel's speed of rotation; on both sides where it stands on its rail."""
+    contact = surface_of(np.random.default_rng(6).normal(size=(5, 4, 4)), -2.0, 1.3)
+    contact.surface_of, contact.table = np.zeros((1, 2, 3), dtype=np.int64), np.zeros((1, 2), int)
+    contact.body, contact.shear, contact.rails = [0], [0.4], Record(range_of=np.zeros(0))
+    bodies = Record(kind=np.zeros(1), row=np.full((1, RADIUS + 1), 0.46), frame=[0])
+    system = Record(contact=contact, bodies=bodies, frame_offset=[0.0])
+    work = Record(plane=np.zeros((1, 16)), rail=np.zeros((1, 2, 8)))
+    state, track, speed, aside = np.zeros(40), np.zeros(6), 3.0, np.array([-0.2, 0.3])
+    state[[1, 3]], work.plane[0, ROLL], work.rail[0, :, ASIDE] = [0.5, 0.2], 0.05, aside
+    state[velocity_begin(1) + 4] = -speed / 0.46
+
+    def heights(t):
+        state[ARC_LENGTH] = 1.1 + speed * t
+        wheel_surface.foreseen_heights(system, work, state, 0, track, 0)
+        return track[:4].copy()
+
+    for module in (rail_parts, wheel_surface):
+        plain(module)
+    y = np.array([-1.0, 1.0]) * (0.5 - aside - 0.4 * 0.15)
+    expected = [wheel_surface.surface_at(contact, 0, 1.1 / 0.46, at)[0] for at in y]
+    found = heights(0.0)
+    assert found[:2] == pytest.approx(expected)
+    assert found[2:] == pytest.approx((heights(1e-6) - heights(-1e-6))[:2] / 2e-6, rel=1e-6)
+
+
 def loads(e, stiffness):
     """N = K e^1.5 + K2 e^2 of three patches."""
     return stiffness[:3] * e**1.5 + stiffness[3:] * e**2
@@ -373,3 +441,24 @@ def test_slopes_of_a_limited_continuation_are_its_derivatives():
     assert there(x) + share * (here(x) - there(x)) == pytest.approx(0.5 * there(x))
     assert [part_y, part_roll] == pytest.approx(approx_fprime(x, lambda at: part(at)[0]), rel=1e-5)
     assert contact_table.allowed_part.py_func(3.0, 0.4, -0.7, 2.0, -0.3, 0.5) == (1.0, 0.0, 0.0)
+
+
+def test_sums_over_a_patch_are_integrals_of_its_overlap():
+    """Linear overlap v, window and lengths between six candidates; two ends lie between them."""
+    random, theta = np.random.default_rng(21), 1e-5
+    h = 1e-4 * np.array([3.0, 0.2, 0.9, 1.6, 4.0, 0.7])
+    lift, window, du = random.uniform(1.0, 1.5, 6), random.uniform(size=6), random.uniform(size=5)
+    z, weight, x = 2e-4, np.empty(6), np.linspace(0.0, 1.0, 20001)
+    sums, means = np.zeros(4), np.zeros(6)
+    for i in range(5):
+        share = np.array([1.0 - x, x])
+        v = np.maximum(z - h[i : i + 2] @ share - theta * lift[i : i + 2] @ share, 0.0)
+        w, L = window[i : i + 2] @ share, lift[i : i + 2].mean()
+        values = v / L, v, 0.5 * w * v**2 / L, w * v / L
+        sums += du[i] * trapezoid(values, x)
+        means[i : i + 2] += du[i] * trapezoid(share * w * v / L, x)
+    given = z, theta, h, lift, du, window, np.empty(6), weight
+    *found, deepest = elastic_patch.patch_sums.py_func(*given)
+    np.testing.assert_allclose(found, sums, rtol=1e-6)
+    np.testing.assert_allclose(weight, means, rtol=1e-5)
+    assert deepest == pytest.approx(max((z - h) / lift) - theta)

@@ -13,6 +13,8 @@ for x in np.linspace(0.05, 11.05, 111):
     expected = [np.interp(at, *table.T) for at in (x - 1e-6, x, x + 1e-6)]
     np.testing.assert_allclose(value, expected[1], atol=1e-12)
     np.testing.assert_allclose(slope, (expected[2] - expected[0]) / 2e-6, atol=1e-6)
+for x, found in ((2.0, (5.0, -4.0)), (3.5, (-1.0, 16.0)), (9.0, (6.0, 0.0))):  # at rows
+    assert table_value_slope(table, x) == found
 assert table_value_slope(table[:1], 3.0) == (5.0, 0.0)
 """
 

@@ -36,6 +36,17 @@ def test_circle_is_the_closed_form():
     assert found[1:] == pytest.approx((a, a), rel=5e-3)
 
 
+@pytest.mark.parametrize(("centre", "R"), [(-0.006, 0.3), (0.006, 0.1)])
+def test_of_two_circles_side_by_side_the_patch_is_the_one_at_its_centre(centre, R):
+    """Closed form of a circle, see above; both touch first at once and are apart under load."""
+    y = np.linspace(-0.014, 0.014, 1401)
+    radius = np.where(y < 0.0, 0.3, 0.1)
+    of = zone(y, 0.5 * (np.abs(y) - 0.006) ** 2 / radius, radius)
+    a = np.sqrt(VIRTUAL * DELTA * 2.0 * R)
+    expected = 4.0 / 3.0 * E_STAR * DELTA * a, a, a
+    assert patch(of, centre) == pytest.approx(expected, rel=1e-2)
+
+
 @pytest.mark.parametrize(("A", "B"), [(1.1, 1.1), (1.1, 4.0), (1.1, 0.3), (0.8, 12.0)])
 @pytest.mark.parametrize("load", [8e3, 70e3])
 def test_patches_of_an_ellipse_are_those_of_hertz(A, B, load):

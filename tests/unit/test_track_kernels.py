@@ -1,0 +1,386 @@
+"""Rails, sleepers and slopes of contact forces by themselves, not compiled, against matrices."""
+
+from types import SimpleNamespace as Record
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+from scipy.optimize import approx_fprime
+
+from railsim.kernels import (
+    contact_damping,
+    learning,
+    rails,
+    rotation,
+    support,
+    support_step,
+    track_frame,
+    transient,
+    wheel_rail,
+)
+from railsim.kernels.contact_columns import (
+    ANGLE_COS,
+    ANGLE_SIN,
+    BEYOND,
+    C_X,
+    C_Y,
+    C_Z,
+    CONTACT_JACOBIAN,
+    FORCE_PER_ROLL,
+    FORCE_PER_Y,
+    FORCE_PER_Z,
+    J_NORMAL,
+    J_SLIP,
+    M_Z,
+    NORMAL,
+    NORMAL_Y,
+    NORMAL_Z,
+    PATCH_ROWS,
+    PATCH_SPEED,
+    PHI,
+    SECANT_ALONG,
+    SLOPE_ACROSS,
+    SLOPE_ALONG,
+    T_X,
+    T_Y,
+    TURN_Y,
+    TURN_Z,
+    W_C_Y,
+    W_C_Z,
+    W_NORMAL,
+    W_PHI,
+    W_Q,
+    W_T_GAMMA,
+    W_T_GAMMA_SPIN,
+    W_XI_X,
+    W_XI_Y,
+    W_Y,
+    WHEEL_COLUMNS,
+    XI_X,
+    XI_Y,
+    A,
+)
+from railsim.kernels.lanes import LANES
+from railsim.kernels.learning import LEARNT_SIZE
+from railsim.kernels.rails import CHANGE_ROLL, CHANGE_Y, CHANGE_Z, CHANGES, PLANE_SIZE, RAIL_SIZE
+from railsim.kernels.state import ARC_LENGTH, LAST_STEP, SPEED, smoothed_begin
+from railsim.kernels.support import (
+    ACCELERATION,
+    BALLAST,
+    C_BALLAST_ROLL,
+    C_BALLAST_Y,
+    C_BALLAST_Z,
+    C_PAD_Y,
+    C_PAD_Z,
+    DOF,
+    HALF_BASE,
+    I_SLEEPER,
+    K_BALLAST_ROLL,
+    K_BALLAST_Y,
+    K_BALLAST_Z,
+    K_PAD_Y,
+    K_PAD_Z,
+    LEARNT,
+    M_RAIL,
+    M_SLEEPER,
+    MEAN_CHANGE,
+    MEAN_RATE,
+    MOVED,
+    PADS,
+    PENDING,
+    RATE,
+    SKIP,
+    SUPPORT_COLUMNS,
+    SUPPORT_ROW,
+    SUPPORT_SIZE,
+    SUPPORT_STEP,
+    WEIGHT,
+)
+from railsim.kernels.system import AHEAD, N_EVENTS, N_WATCH
+from railsim.kernels.track_frame import TrackTables
+
+SIDES = np.array([-1.0, 1.0])
+
+
+def matrices(row, pads, ballast):
+    """Mass, damping and stiffness of left rail (y, z), right rail and sleeper (y, z, roll).
+
+    A pad is deflected by how far its rail moves from the end of the sleeper, y and z + base roll.
+    """
+    deflected = np.zeros((4, 7))
+    for k, side in enumerate(SIDES):
+        deflected[2 * k, [2 * k, 4]] = 1.0, -1.0
+        deflected[2 * k + 1, [2 * k + 1, 5, 6]] = 1.0, -1.0, -side * row[HALF_BASE]
+    found = [np.diag(row[[M_RAIL] * 4 + [M_SLEEPER] * 2 + [I_SLEEPER]])]
+    for pad, below in (
+        ([C_PAD_Y, C_PAD_Z], [C_BALLAST_Y, C_BALLAST_Z, C_BALLAST_ROLL]),
+        ([K_PAD_Y, K_PAD_Z], [K_BALLAST_Y, K_BALLAST_Z, K_BALLAST_ROLL]),
+    ):
+        under = np.zeros((7, 7))
+        under[4:, 4:] = ballast * np.diag(row[below])
+        found.append(deflected.T @ np.diag(pads * np.tile(row[pad], 2)) @ deflected + under)
+    return found
+
+
+def in_lanes(motion):
+    """Motions of four tracks, shape (4, 7), as kernels take them: wheel by wheel."""
+    return [motion[:, :4].reshape(-1, 2)[:, k] for k in (0, 1)] + [
+        np.repeat(motion[:, 4 + k], 2) for k in (0, 1, 2)
+    ]
+
+
+def test_forces_of_tracks_and_their_implicit_motion_are_those_of_matrices(plain):
+    """Four tracks of other pads and ballast; wheels are in contact with their rails."""
+    random = np.random.default_rng(3)
+    given = Record(row=random.uniform(0.5, 2.0, SUPPORT_ROW), sleeper=1)
+    factors = random.uniform(0.5, 2.0, (4, 2))
+    own = [matrices(given.row, *pair) for pair in factors]
+    u, rate, load = random.normal(size=(3, 4, 7))
+    contact = random.uniform(0.1, 0.4, (2, 6, LANES))
+    plain(support)
+    in_pairs = np.repeat(factors.T, 2, axis=1)
+    found = support.track_forces(given, in_pairs, in_lanes(u), in_lanes(rate), -0.7)
+    expected = [-0.7 * C @ v - K @ x for (_, C, K), v, x in zip(own, rate, u, strict=True)]
+    np.testing.assert_allclose(found, in_lanes(np.array(expected)), rtol=1e-12, atol=1e-12)
+    m, c, k = 1.7, 0.6, 0.9
+    found = support.solve_track(given, in_pairs, *contact, in_lanes(load), m, c, k)
+    for w, (M, C, K) in enumerate(own):
+        for side in range(2):
+            here = slice(2 * side, 2 * side + 2)
+            stiff, damped = contact[:, [0, 1, 3, 4], 2 * w + side].reshape(2, 2, 2)
+            K[here, here] += stiff
+            C[here, here] += damped
+        load[w] = np.linalg.solve(m * M + c * C + k * K, load[w])
+    np.testing.assert_allclose(found, in_lanes(load), rtol=1e-10)
+    weights = support.weighed(given.row, in_lanes(u))
+    expected = np.array([M @ x for (M, _, _), x in zip(own, u, strict=True)])
+    np.testing.assert_allclose(weights, in_lanes(expected))
+    masses = [support.mass_of(given.row, k) for k in range(DOF)]
+    assert masses == pytest.approx(np.diag(own[0][0]))
+
+
+def test_stiffness_of_the_track_is_that_where_each_wheelset_stands(plain):
+    """Factors of pads and ballast, linear between their rows; the frames are apart."""
+    variation = np.array([[0.0, 1.0, 2.0], [4.0, 3.0, 0.5], [10.0, 0.8, 1.4]])
+    system = Record(support=Record(variation=variation), frame_offset=[0.0, -2.5, 1.0])
+    system.bodies, system.contact = Record(frame=[0, 2, 1]), Record(body=[1, 2])
+    work = Record(support_step=np.full((2, SUPPORT_STEP), 7.0))
+    plain(support)
+    support.locate_support(system, work, 6.0)
+    for w, s in enumerate((7.0, 3.5)):
+        found = work.support_step[w, [PADS, BALLAST, PENDING, SKIP]]
+        expected = [np.interp(s, variation[:, 0], variation[:, k]) for k in (1, 2)]
+        assert found == pytest.approx([*expected, 0.0, 0.0])
+
+
+def creep_force(xi, G, a, b, mu_N, c11, c22, c23, phi):
+    """Linear force with spin, saturated by the cubic of Vermeulen and Johnson (1964)."""
+    linear = np.array([c11 * xi[0], c22 * xi[1] + np.sqrt(a * b) * c23 * phi]) * G * a * b
+    u = np.linalg.norm(linear) / mu_N
+    return linear / u * (1.0 - (1.0 - min(u, 3.0) / 3.0) ** 3)
+
+
+def test_slopes_of_the_creep_force_are_its_derivatives(plain):
+    """Over the slip along and across; eight patches of other loads, one of which slides."""
+    random, G, speed = np.random.default_rng(5), 8e10, 20.0
+    a, b = random.uniform(2e-3, 6e-3, (2, LANES))
+    c11, c22, c23 = random.uniform([[4.0], [3.0], [1.0]], [[5.0], [4.0], [2.0]], (3, LANES))
+    mu_N = random.uniform(1e4, 3e4, LANES)
+    xi, phi = 1e-3 * random.normal(size=(2, LANES)), 0.1 * random.normal(size=LANES)
+    xi[0, -1] = 0.1
+    patches = Record(
+        a=a, b=b, mu_N=mu_N, c11=c11, c22=c22, c23=c23, xi_x=xi[0], xi_y=xi[1], phi=phi
+    )
+    found = np.zeros((3, LANES))
+    plain(contact_damping)
+    contact_damping.creep_slopes(LANES, patches, speed, G, *found)
+    for k in range(LANES):
+        given = G, a[k], b[k], mu_N[k], c11[k], c22[k], c23[k], phi[k]
+        slopes = np.diag(approx_fprime(xi[:, k], lambda x, g=given: creep_force(x, *g), 1e-9))
+        secant = creep_force(xi[:, k], *given)[0] / xi[0, k]
+        assert speed * found[:, k] == pytest.approx([*slopes, secant], rel=1e-4, abs=1.0)
+
+
+def test_slopes_of_followed_creepages_are_those_of_what_the_step_takes_up(plain):
+    """dc/dxi of the followed creepage c is what a step leaves of the creep force's slopes."""
+    system = Record(
+        bodies=Record(kind=np.zeros(1)),
+        internal=Record(kind=np.zeros(0)),
+        support=Record(elastic=0),
+    )
+    random = np.random.default_rng(8)
+    for module in (support, transient):
+        plain(module)
+    first = transient.transient_begin(system)
+    state = random.normal(size=first + transient.TRANSIENT_SIZE)
+    state[LAST_STEP] = 1.5e-3
+    index = np.array([[0, 0, 1], [0, 1, 0]])
+    for _, side, p in index:
+        state[first + transient.PATCH_STATE * (transient.TRACED * side + p) + transient.CARRIES] = (
+            transient.CARRIED
+        )
+    given = random.uniform(0.5, 2.0, (PATCH_ROWS, 2))
+    given[A], given[PATCH_SPEED] = [4e-3, 9e-3], [20.0, 8.0]
+    shape = 1, 2, transient.TRACED, transient.TRANSIENT
+    work = Record(patch_index=index, transient=np.zeros(shape))
+
+    def followed(change):
+        work.patch = given.copy()
+        work.patch[XI_X] += change
+        transient.follow_creepages(system, work, 2, state)
+        return work.patch[XI_X].copy()
+
+    before = followed(0.0)
+    slope = followed(1.0) - before
+    transient.give_back_creepages(system, work, 2, state)
+    rows = [SLOPE_ALONG, SLOPE_ACROSS, SECANT_ALONG]
+    np.testing.assert_allclose(work.patch[rows], given[rows] * slope, rtol=1e-10)
+    z = 1.5e-3 * given[PATCH_SPEED] / given[A]
+    assert slope == pytest.approx(1.0 - (1.0 - np.exp(-z)) / z)
+    assert work.patch[XI_X] == pytest.approx(given[XI_X] + 1.0)
+
+
+@pytest.mark.parametrize("touching", [(0, 1, 2), (0, 1), (1, 2), (0, 2), (1,)])
+def test_patches_that_load_each_other_share_a_motion_as_their_equations_say(touching):
+    """dN_i = k_i (n_i d - sum_j kappa_ij dN_j) of neighbours, along y, z and roll."""
+    random, n = np.random.default_rng(17), len(touching)
+    kappa = np.array([[0.0, 0.3, 0.0], [0.3, 0.0, 0.2], [0.0, 0.2, 0.0]])
+    k, normal = random.uniform(0.5, 1.5, 3), random.normal(size=(3, 3))
+    normal[1] = 1.0  # along z
+    patch = np.zeros((PATCH_ROWS, n + 2))
+    rows = [FORCE_PER_Y, FORCE_PER_Z, FORCE_PER_ROLL]
+    of = list(touching)
+    patch[rows, 1:-1] = (k * normal)[:, of]
+    index = np.zeros((n + 2, 3), dtype=np.int64)
+    index[:, 2] = [2, *touching, 0]  # of other wheels before and after
+    work = Record(patch=patch, patch_index=index)
+    contact_damping.couple_stiffness.py_func(work, np.array([[9.0, 9.0], [0.3, 0.2]]), 1, 1, n + 1)
+    matrix = np.eye(n) + k[of, None] * kappa[np.ix_(of, of)]
+    np.testing.assert_allclose(patch[rows, 1:-1].T, np.linalg.solve(matrix, (k * normal)[:, of].T))
+    assert not patch[:, [0, -1]].any()
+
+
+def test_a_patch_takes_its_slip_and_its_approach_from_the_wheelsets_speeds(plain):
+    """Forces on the wheelset in y, z and roll: -across (t v) t and -c (n v) (n + T_y/N t)."""
+    random, across, damping, g = np.random.default_rng(18), 3.0, 2.0, 0.7
+    patch, jacobian = random.uniform(0.5, 2.0, (PATCH_ROWS, 3)), np.zeros((2, CONTACT_JACOBIAN))
+    patch[[NORMAL_Y, NORMAL_Z], 2] = np.sin(g), np.cos(g)
+    place = np.array([0.0, *patch[[C_Y, C_Z], 2]])
+    n, t = np.array([0.0, np.sin(g), np.cos(g)]), np.array([0.0, np.cos(g), -np.sin(g)])
+    share = patch[T_Y, 2] / patch[NORMAL, 2]
+    plain(contact_damping)
+    contact_damping.add_damping(
+        Record(patch=patch, contact_jacobian=jacobian), 1, 2, across, damping
+    )
+    slip, normal = np.zeros((2, 3, 3))
+    for k, motion in enumerate(
+        ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0], np.cross([1.0, 0.0, 0.0], place))
+    ):
+        force_t, force_n = across * (t @ motion) * t, damping * (n @ motion) * (n + share * t)
+        for found, force in ((slip, force_t), (normal, force_n)):
+            found[:, k] = *force[1:], np.cross(place, force)[0]
+    assert jacobian[1, J_SLIP : J_SLIP + 6] == pytest.approx(slip[np.triu_indices(3)])
+    np.testing.assert_allclose(jacobian[1, J_NORMAL : J_NORMAL + 9].reshape(3, 3), normal)
+
+
+def test_a_track_that_is_corrected_is_as_if_its_step_had_had_the_corrected_mean_rate(plain):
+    """Way h r, rate c r, its change c/h r and acceleration c^2/h r of a mean rate r, c = 1 + g."""
+    random, h, g = np.random.default_rng(23), 2e-3, 0.4
+    system = Record(
+        bodies=Record(kind=np.zeros(1)), internal=Record(kind=np.zeros(0)),
+        contact=Record(transient=0, body=np.zeros(2)),
+        support=Record(row=random.uniform(0.5, 2.0, SUPPORT_ROW), sleeper=1),
+    )  # fmt: skip
+    for module in (support, learning, support_step):
+        plain(module)
+    begin = support.support_begin(system)
+    state = random.normal(size=begin + 2 * SUPPORT_SIZE)
+    tracks = state[begin:].reshape(2, SUPPORT_SIZE)
+    tracks[:, WEIGHT], tracks[:, LEARNT : LEARNT + 2 * LEARNT_SIZE] = g, 0.0
+    before = tracks.copy()
+    work = Record(
+        support=random.uniform(0.1, 0.4, (2, 2, SUPPORT_COLUMNS)),
+        support_step=random.uniform(0.5, 2.0, (2, SUPPORT_STEP)),
+    )
+    work.support_step[:, MOVED] = 1.0, 0.0
+    support_step.move_rails(system, work, state, support_step.eight_in_pairs(0, 2), h, True)
+    change = tracks - before
+    r = change[0, MEAN_RATE : MEAN_RATE + DOF].copy()
+    assert np.all(r != 0.0)
+    c = 1.0 + g
+    for first, factor in ((0, h), (RATE, c), (MEAN_CHANGE, c / h), (ACCELERATION, c * c / h)):
+        assert change[0, first : first + DOF] == pytest.approx(factor * r, abs=1e-12)
+        assert not change[1, first : first + DOF].any()  # this one's forces are balanced
+
+
+def test_rates_beside_the_rails_change_by_the_rails_slopes_and_the_acceleration(plain):
+    """Until a time later: V (slope now less slope then) and h times the acceleration."""
+    random, h, speed, now = np.random.default_rng(12), 5e-3, 20.0, 0.3
+    c = 0.02 * random.normal(size=(1, 6, 4))
+    plane, rail = np.zeros((1, PLANE_SIZE)), np.zeros((1, 2, RAIL_SIZE))
+    for module in (rotation, track_frame, rails):
+        plain(module)
+    table = TrackTables(0.0, 1.0, c, c, 1, 1.5)
+    rails.locate_in_cells(table, np.zeros(1, dtype=np.int64), np.array([now]), plane, rail)
+    watch, state = np.zeros(N_WATCH), random.normal(size=80)
+    watch[AHEAD], state[SPEED], state[ARC_LENGTH] = h, speed, now - 0.1
+    system = Record(
+        track=table,
+        bodies=Record(kind=np.zeros(2), frame=[0, 1]),
+        frame_offset=[0.0, 0.1],
+        contact=Record(body=[1]),
+        internal=Record(kind=np.zeros(0)),
+    )
+    change = np.zeros((2, CHANGES))
+    work = Record(plane=plane, rail=rail, rate_change=change, watch=watch)
+    own = smoothed_begin(2, 0) + 6
+    rails.predict_rate_changes(system, work, 0, state)
+    y_a, z_a, roll_a = state[own + 1 : own + 4]
+    for side in range(2):
+        y, z = (Polynomial(c[0, 2 * side + k]).deriv() for k in (0, 1))
+        assert change[side, [CHANGE_Y, CHANGE_Z, CHANGE_ROLL]] == pytest.approx(
+            [
+                speed * (y(now) - y(now + speed * h)) + h * y_a,
+                speed * (z(now) - z(now + speed * h)) + h * z_a,
+                h * roll_a,
+            ]
+        )
+
+
+def test_forces_of_patches_on_their_wheels_and_what_is_told_of_them(plain):
+    """In vectors, c x F; work per metre of way; creepages and place of the most loaded patch."""
+    random, speed, angle, n = np.random.default_rng(29), 20.0, np.array([0.1, 0.9, -0.4]), 3
+    patch = random.normal(size=(PATCH_ROWS, n))
+    patch[[ANGLE_SIN, ANGLE_COS]] = np.sin(angle), np.cos(angle)
+    patch[[NORMAL_Y, NORMAL_Z]] = np.sin(angle + 0.05), np.cos(angle + 0.05)
+    patch[NORMAL], patch[PATCH_SPEED], patch[BEYOND] = [7e4, 2e4, 5e4], [21.0, 17.0, 19.0], 0.0
+    system = Record(contact=Record(body=[1]), support=Record(elastic=0))
+    work = Record(
+        patch=patch, patch_index=np.array([[0, 1, 0], [0, 1, 2], [0, 0, 0]]),
+        rail_force=np.zeros((2, 6)), wheel=np.zeros((1, 2, WHEEL_COLUMNS)),
+        watch=np.zeros(N_WATCH), events=np.zeros((1, N_EVENTS), dtype=np.int64),
+        contact_jacobian=np.zeros((2, CONTACT_JACOBIAN)),
+    )  # fmt: skip
+    for module in (contact_damping, wheel_rail):
+        plain(module)
+    wheel_rail.add_creep_forces(system, work, n, speed, np.zeros(20))
+    force, told = np.zeros(6), np.zeros((2, 4))
+    for k, side in enumerate((1, 1, 0)):
+        s, c = patch[[NORMAL_Y, NORMAL_Z], k]
+        along = np.array([1.0, *patch[[TURN_Y, TURN_Z], k]])
+        normal, across = np.array([0.0, s, c]), np.array([0.0, c, -s])
+        normal[0], across[0] = -along @ normal, -along @ across
+        acts = -patch[T_X, k] * along - patch[T_Y, k] * across
+        force[:3] += acts
+        force[3:] += np.cross(patch[[C_X, C_Y, C_Z], k], acts) - patch[M_Z, k] * normal
+        slip = patch[PATCH_SPEED, k] / speed * patch[[XI_X, XI_Y, PHI], k]
+        told[side] += [
+            *patch[T_Y, k] * np.array([-np.sin(angle[k]), np.cos(angle[k])]),
+            patch[[T_X, T_Y], k] @ slip[:2], patch[M_Z, k] * slip[2],
+        ]  # fmt: skip
+    np.testing.assert_allclose(work.rail_force[1], force)
+    np.testing.assert_allclose(work.wheel[0][:, [W_Q, W_Y, W_T_GAMMA, W_T_GAMMA_SPIN]], told)
+    for side, k in ((0, 2), (1, 0)):
+        slip = patch[PATCH_SPEED, k] / speed * patch[[XI_X, XI_Y, PHI], k]
+        found = work.wheel[0, side, [W_NORMAL, W_XI_X, W_XI_Y, W_PHI, W_C_Y, W_C_Z]]
+        assert found == pytest.approx([patch[NORMAL, k], *slip, *patch[[C_Y, C_Z], k]])
