@@ -6,6 +6,7 @@ import math
 import pickle
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import example_result
@@ -355,3 +356,17 @@ def test_name_that_is_not_there_says_which_are():
         Table(["speed"], [[20.0]])["spede"]
     with pytest.raises(TypeError, match="give keys with their values"):
         railsim.load_vehicle("coach_manchester").with_values("mass")
+
+
+def test_runs_in_threads_are_those_one_after_the_other(coach):
+    """To the bit: the time loop lets other threads run, and runs share no arrays that it writes."""
+    track = railsim.load_track("curve_r250")
+
+    def end(speed):
+        return railsim.simulate(coach, track, speed=speed, until=30.0).groups["state"]["end"]
+
+    speeds = (15.0, 18.0, 15.0, 18.0)
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(end, speeds))
+    for state, speed in zip(found, speeds, strict=True):
+        assert np.array_equal(state, end(speed))
