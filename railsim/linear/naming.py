@@ -166,8 +166,8 @@ def divergence(parts: Parts, modes: Eigenmodes) -> tuple[str, ...]:
         name = parts.model.index.bodies[farthest]
         cause = f", and {name} moves farthest, as where springs do not hold it upright"
     elif ways[farthest] > 0.0:
-        cause = " for one beside it, as on hollow treads, whose radius falls towards the flange at "
-        cause += "first"
+        hollow = "as on hollow treads, whose radius falls towards the flange at first"
+        cause = f" for one beside it, {hollow}"
     return (
         f"a motion that does not oscillate grows by {mode.eigenvalues[0].real:.3g} 1/s: the "
         f"vehicle leaves the state that is linearised{cause}; modes and linear critical speeds are "
