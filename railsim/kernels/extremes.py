@@ -13,7 +13,6 @@ from railsim.kernels.contact_columns import W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.lanes import LANES, any_beyond, larger, load_lanes, smaller, spread
 from railsim.kernels.rails import against_rails
 from railsim.kernels.state import ARC_LENGTH, TIME
-from railsim.kernels.support import SUPPORT_SIZE, support_begin
 from railsim.kernels.system import Z_0
 
 # columns of Work.extremes; those of a wheel are followed by the same of the right one
@@ -52,7 +51,6 @@ def note_extremes(system, work, state):
     wheel, plane, present, extremes = work.wheel, work.plane, work.present, work.extremes
     time, s = state[TIME], state[ARC_LENGTH]
     body = system.contact.body
-    rails = support_begin(system)
     for w in range(body.shape[0]):
         b = 6 * body[w]
         for side in range(2):
@@ -65,15 +63,11 @@ def note_extremes(system, work, state):
         left, right = present[X_Y], present[X_Y_RIGHT]
         present[X_SUM_Y] = left + right
         present[X_SUM_ABS_Y] = abs(left) + abs(right)
-        yielded = 0.0, 0.0, 0.0, 0.0
-        if system.support.elastic:
-            i = rails + SUPPORT_SIZE * w
-            yielded = state[i], state[i + 1], state[i + 2], state[i + 3]
         height = system.bodies.row[body[w], Z_0]
         y, z, roll = state[b + 1], state[b + 2] + height, state[b + 3]
         yaw = state[b + 5]
         present[X_LATERAL], present[X_ROLL] = against_rails(
-            plane, system.track.rail_base, w, y, z, roll, yaw, yielded
+            plane, system.track.rail_base, w, y, z, roll, yaw, work.rail_motion
         )
         present[X_YAW] = yaw
         high, low = EXTREMES * (MAX * body.shape[0] + w), EXTREMES * (MIN * body.shape[0] + w)

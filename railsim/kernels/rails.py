@@ -190,10 +190,11 @@ def against_rails(plane, rail_base, w, y, z, roll, yaw, yielded):
         See `TrackTables` [m].
     y, z, roll, yaw : float
         Centre of the wheelset in the track frame, z from the rail tops [m]; roll and yaw [rad].
-    yielded : four floats
-        y and z by which the left and the right rail yield, in the axes of their plane [m].
+    yielded : float64[w, 2, 2 or more]
+        y and z by which each rail yields, in the axes of their plane [m].
     """
-    left_y, left_z, right_y, right_z = yielded
+    left_y, left_z = yielded[w, 0, MOTION_Y], yielded[w, 0, MOTION_Z]
+    right_y, right_z = yielded[w, 1, MOTION_Y], yielded[w, 1, MOTION_Z]
     sine, cosine = plane[w, SINE], plane[w, COSINE]
     y -= plane[w, MIDDLE_Y]
     z -= plane[w, MIDDLE_Z]
@@ -204,7 +205,7 @@ def against_rails(plane, rail_base, w, y, z, roll, yaw, yielded):
 
 
 @compiled(in_loop=False)
-def recorded_against_rails(track, body, offset, height, first, size, states, plane, rail, found):
+def recorded_against_rails(track, body, offset, height, states, yielded, plane, rail, found):
     """`against_rails` of all wheelsets in recorded states.
 
     Parameters
@@ -214,16 +215,14 @@ def recorded_against_rails(track, body, offset, height, first, size, states, pla
         Body of each wheelset.
     offset, height : float64[w]
         Of each wheelset from the reference body along the track and from the rail tops [m].
-    first, size : int
-        Where the rails of the first wheelset stand in a state, and how far the next ones are from
-        them; a size of 0: rails are rigid.
     states : float64[time, n_state]
+    yielded : float64[time, w, 2, 2]
+        y and z by which each rail yields, in the axes of their plane [m].
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE]
         Scratch; the planes as those of smooth rails.
     found : float64[time, w, 2]
         Lateral displacement [m] and roll [rad] (output).
     """
-    yielded = 0.0, 0.0, 0.0, 0.0
     n = body.shape[0]
     cell, cell_u = np.zeros(n, dtype=np.int64), np.zeros(n)
     for i in range(states.shape[0]):
@@ -234,12 +233,9 @@ def recorded_against_rails(track, body, offset, height, first, size, states, pla
         if track.has_irregularity:
             locate_in_cells(track, cell, cell_u, plane, rail)
         for w in range(n):
-            if size > 0:
-                k = first + size * w
-                yielded = states[i, k], states[i, k + 1], states[i, k + 2], states[i, k + 3]
             b = 6 * body[w]
             y, z, roll = states[i, b + 1], states[i, b + 2] + height[w], states[i, b + 3]
             yaw = states[i, b + 5]
             found[i, w, 0], found[i, w, 1] = against_rails(
-                plane, track.rail_base, w, y, z, roll, yaw, yielded
+                plane, track.rail_base, w, y, z, roll, yaw, yielded[i]
             )

@@ -7,6 +7,7 @@ import numpy as np
 from railsim.kernels import compiled
 from railsim.kernels.controllers import ACTUATOR, actuator_output
 from railsim.kernels.element_outputs import element_outputs
+from railsim.kernels.rails import MOTION_Y, MOTION_Z
 from railsim.kernels.record import record
 from railsim.kernels.state import internal_begin
 
@@ -21,6 +22,7 @@ class Recorder(NamedTuple):
     rates : float64[r, 6 n]           rates of the coordinates
     acceleration : float64[r, n, 6]   absolute, in body axes
     wheel : float64[r, w, 2, WHEEL_COLUMNS]  see `contact_columns`
+    rail : float64[r, w, 2, 2]        what a rail yields, y and z, see `rails`
     patch : float64[r, w, 2, 3, PATCH_ROWS]  contact patches, or of length 0
     chosen : int64[e, 2]              elements to record, see `element_outputs`
     element : float64[r, e, ELEMENT_COLUMNS]
@@ -30,6 +32,7 @@ class Recorder(NamedTuple):
     rates: np.ndarray
     acceleration: np.ndarray
     wheel: np.ndarray
+    rail: np.ndarray
     patch: np.ndarray
     chosen: np.ndarray
     element: np.ndarray
@@ -49,6 +52,8 @@ def record_row(recorder, row, system, state, derivative, work, n_patches):
         for side in range(2):
             for k in range(recorder.wheel.shape[3]):
                 recorder.wheel[row, w, side, k] = work.wheel[w, side, k]
+            recorder.rail[row, w, side, 0] = work.rail_motion[w, side, MOTION_Y]
+            recorder.rail[row, w, side, 1] = work.rail_motion[w, side, MOTION_Z]
     if recorder.patch.shape[0] > 0:
         record_patches(recorder.patch, row, work, n_patches)
     if recorder.chosen.shape[0] > 0:

@@ -131,6 +131,7 @@ def empty_recorder(
         rates=np.zeros((rows, 6 * n)),
         acceleration=np.zeros((rows, n, 6)),
         wheel=np.zeros((rows, wheelsets, 2, WHEEL_COLUMNS)),
+        rail=np.zeros((rows, wheelsets, 2, 2)),
         patch=np.zeros((rows if patches else 0, wheelsets, 2, of_wheel, PATCH_ROWS)),
         chosen=chosen,
         element=np.zeros((rows, len(chosen), ELEMENT_COLUMNS)),

@@ -24,7 +24,7 @@ from railsim.kernels.rails import (
 )
 from railsim.kernels.registers import LANES
 from railsim.kernels.state import N_SCALARS
-from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_SIZE, SUPPORT_STEP, TRACED
+from railsim.kernels.support import RAIL_DOF, SUPPORT_COLUMNS, SUPPORT_SIZE, SUPPORT_STEP, TRACED
 from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
 from railsim.kernels.transient import TRANSIENT
 from railsim.kernels.vibration import VIBRATION
@@ -159,21 +159,21 @@ def uneven_rigid_rails(system: kernel.System) -> int:
     return int(system.track.has_irregularity and not system.support.elastic)
 
 
-def against_rails(system: kernel.System, state: Floats) -> Floats:
+def against_rails(system: kernel.System, state: Floats, rail: Floats | None = None) -> Floats:
     """Lateral displacement and roll of each wheelset against its rails, from recorded states.
 
-    float64[time, wheelset, 2] [m], [rad].
+    `rail`: what each rail yields, float64[time, wheelset, side, 2] [m]; default: as in the states.
+    Returns float64[time, wheelset, 2] [m], [rad].
     """
-    axles, elastic = system.contact.body, system.support.elastic
+    axles = system.contact.body
     found = np.empty((len(state), len(axles), 2))
     recorded_against_rails(
         system.track,
         axles,
         system.frame_offset[system.bodies.frame[axles]],
         system.bodies.row[axles, kernel.Z_0],
-        first_rail(system, state),
-        SUPPORT_SIZE if elastic else 0,
         state,
+        rail_displacement(system, state) if rail is None else rail,
         smooth_planes(len(axles)),
         np.zeros((len(axles), 2, RAIL_SIZE)),
         found,
@@ -181,6 +181,13 @@ def against_rails(system: kernel.System, state: Floats) -> Floats:
     return found
 
 
-def first_rail(system: kernel.System, state: Floats) -> int:
-    """Index of the first wheelset's elastic rails in a state."""
-    return int(state.shape[1] - N_SCALARS - len(system.contact.body) * SUPPORT_SIZE)
+def rail_displacement(system: kernel.System, state: Floats) -> Floats:
+    """Displacement of the rail heads on their support, from states.
+
+    float64[time, wheelset, side, 2], lateral and vertical [m]; zero on rigid rails.
+    """
+    rows, wheelsets = len(state), len(system.contact.body)
+    if not system.support.elastic:
+        return np.zeros((rows, wheelsets, 2, 2))
+    track = state[:, -N_SCALARS - wheelsets * SUPPORT_SIZE : -N_SCALARS]
+    return track.reshape(rows, wheelsets, SUPPORT_SIZE)[..., :RAIL_DOF].reshape(rows, -1, 2, 2)

@@ -15,11 +15,9 @@ from railsim.kernels.actuators import ACTION, AXLE
 from railsim.kernels.controllers import ACTUATOR
 from railsim.kernels.driving import recorded_axle_torques
 from railsim.kernels.recording import Recorder
-from railsim.kernels.state import N_SCALARS
-from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
 from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
-from railsim.model.work import against_rails, first_rail, parts_of_wheel
+from railsim.model.work import against_rails, parts_of_wheel
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import all_sensors, motions, readings
 from railsim.result.sinks import matches
@@ -47,7 +45,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     outwards = np.array([-1.0, 1.0])
     loaded = np.where(Q > 0.0, Q, np.nan)  # a wheel that carries nothing has no Y/Q
     offsets = model.system.frame_offset[model.system.bodies.frame[axles]]
-    on_rails = against_rails(model.system, state)
+    on_rails = against_rails(model.system, state, recorder.rail[:rows])
     has_check = len(model.check.check) > 0
     of_check = {"force": contact.W_CHECK, "T_gamma": contact.W_CHECK_GAMMA} if has_check else {}
     return {
@@ -84,19 +82,6 @@ def _of_both(values: Floats) -> Floats:
     """Sum over the last axis, the sides; numpy's own takes far longer over an axis of two."""
     total: Floats = 0.0 + values[..., 0] + values[..., 1]  # from zero, so that there is no -0.0
     return total
-
-
-def rail_deflection(model: Model, state: Floats) -> Floats:
-    """Displacement of the rail heads on their support, from recorded states.
-
-    float64[time, wheelset, side, 2], lateral and vertical [m]; zero on rigid rails.
-    """
-    rows, wheelsets = len(state), len(model.index.wheelsets)
-    if not model.system.support.elastic:
-        return np.zeros((rows, wheelsets, 2, 2))
-    first = first_rail(model.system, state)
-    track = state[:, first:-N_SCALARS].reshape(rows, wheelsets, SUPPORT_SIZE)
-    return track[..., :RAIL_DOF].reshape(rows, wheelsets, 2, 2)
 
 
 def run_extremes(extremes: Floats, Q0: Floats) -> dict[str, Floats]:
@@ -271,7 +256,7 @@ class OutputPlan:
             values["axle_torque"] = self._axle_torques(recorder, rows)
         if self._asked.track:
             values |= self._track(values["wheelset_distance"])
-            deflection = rail_deflection(self._model, recorder.state[:rows])
+            deflection = recorder.rail[:rows]
             axles = self._model.system.contact.body
             values |= {
                 "rail_deflection_lateral": deflection[..., 0],

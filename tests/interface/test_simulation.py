@@ -320,6 +320,31 @@ def test_rails_that_are_not_wheels_or_numbers_do_not_move(
     assert not np.any(sim.state.counted[-2])
 
 
+def test_wheelsets_are_seen_against_rails_that_were_moved(coach, track):
+    """By 3 and 1 mm to the right, 1 mm up on the left and 2 mm down on the right."""
+    rigid = track.replace(support={"preset": "rigid"})
+    asked = railsim.Settings(outputs={"track": True})
+    rails = np.tile([[3e-3, -1e-3], [1e-3, 2e-3]], (4, 1, 1))
+    sim = railsim.Simulation(coach, rigid, speed=20.0, duration=0.05, settings=asked)
+    with sim:
+        sim.set_rails(rails, 0.0)
+        seen = sim.read("wheelset_roll")
+        sim.run()
+        run = sim.result()
+    lean = (2e-3 + 1e-3) / 1.5
+    np.testing.assert_allclose(run.wheelset_roll, run.wheelset_roll_on_track - lean, atol=1e-12)
+    np.testing.assert_array_equal(run.wheelset_roll[0], seen)
+    radius = 0.46
+    across = run.wheelset_lateral_on_track - 2e-3 - lean * radius
+    np.testing.assert_allclose(run.wheelset_lateral, across, atol=lean * 3e-3)
+    for i, name in enumerate(("lateral", "vertical")):
+        moved = np.broadcast_to(rails[:, :, i], run.Q.shape)
+        np.testing.assert_array_equal(run[f"rail_deflection_{name}"], moved)
+    most = run.groups["peaks"]["wheelset_roll"]
+    assert np.all(most[0] >= run.wheelset_roll.max(axis=0) - 1e-12)
+    assert np.all(most[1] <= run.wheelset_roll.min(axis=0) + 1e-12)
+
+
 def test_a_file_is_there_when_whole(coach, track, tmp_path):
     path = tmp_path / "run.h5"
     way = {"speed": 20.0, "duration": 0.1, "record": path}

@@ -25,9 +25,8 @@ from railsim.kernels.support import (
 )
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.model.time_step import SCHEMES, _step_growth, empty_recorder
-from railsim.model.work import level_track_with_friction, work_arrays
+from railsim.model.work import level_track_with_friction, rail_displacement, work_arrays
 from railsim.simulation import simulate
-from railsim.simulation.outputs import rail_deflection
 
 ELASTIC = ["ballasted", "co-running", "p2", "slab"]
 
@@ -44,7 +43,7 @@ def test_static_deflection_is_the_load_over_the_stiffness_of_the_chain(preset):
     compliance = 1.0 / values.pad_vertical[0]
     if values.has_sleeper:
         compliance += 1.0 / values.ballast_vertical[0]
-    found = rail_deflection(balance.model, balance.state[None])[0]
+    found = rail_displacement(balance.model.system, balance.state[None])[0]
     work, _ = evaluate(balance.model.system, balance.state)
     np.testing.assert_allclose(found[..., 1], compliance * work.wheel[:, :, W_Q], rtol=1e-6)
     rigid = steady(load_vehicle("coach_manchester"), on("rigid"), Settings(), 1.0)
