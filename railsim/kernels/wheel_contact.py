@@ -92,7 +92,7 @@ from railsim.kernels.support import SKIP
 from railsim.kernels.system import AHEAD, AT_SECTIONS, COS_ROLL, SIDEWAYS, SIN_ROLL, Y_0, Z_0
 from railsim.kernels.table_ends import LIFT_RANGE, all_far, beside_sections, outside, without_rail
 from railsim.kernels.track_frame import OMEGA
-from railsim.kernels.wheel_surface import note_surfaces, raise_gap
+from railsim.kernels.wheel_surface import AT_ONCE, note_surfaces, raise_gap
 
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
 NEAR = 2e-3
@@ -325,6 +325,8 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
         stiffness = work.stiffness[2 * first : 2 * first + 2 * N_PATCH]
         coupled_approaches(contact.coupling, table, stiffness, approach[first : first + N_PATCH])
     clear_wheel(work.wheel, w, side, lift)
+    if lift > 0.0:  # rails rise towards it: when it will strike is not foreseen
+        work.force_rate[w] = AT_ONCE
     begin = n
     for patch in range(N_PATCH * count):
         p = approach[patch]
