@@ -3,7 +3,7 @@
 One page for every shipped vehicle: drawing, data, gaps, modes, a run through a curve; and the
 tables of vehicles and tracks in `docs/user/library.md`.  The numbers are those of the TOML files,
 read line by line with the letters beside them.  Part `data` computes nothing: it rewrites the parts
-that come from the files alone.  All vehicles take about two minutes.
+that come from the files alone.  A vehicle takes about a minute.
 """
 
 import re
