@@ -196,11 +196,13 @@ def _why(motion: VehicleMotion, seed: Point) -> str:
 def _birth(motion: VehicleMotion, lost: LossOfStability) -> tuple[Shooting, PeriodicMotion]:
     """The branch at the bifurcation; its first shape is that of a small motion in the time loop."""
     speed = float(lost.parameter or 0.0)
-    flow = VehicleFlow(motion, speed)
     frequency = float(lost.modes[0].frequencies[0])
     period = 1.0 / frequency
+    # hunting may be in the shape of another mode, in which nothing would be left but what dies out
+    motion = VehicleMotion(motion.prepared, motion.scheme, lost.modes[0])
     # the scheme's memory settles
     state = motion.stretch(motion.rest(speed, FIRST), speed, speed, 2.0 * period).state
+    flow = VehicleFlow(motion, speed)
     rest = flow.reduced(motion.prepared.steady(speed))
     begin = flow.reduced(state) - rest
     quarter = flow.after((rest + begin)[None], np.array([0.25 * period]), np.array([speed]))[0]

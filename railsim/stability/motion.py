@@ -92,7 +92,7 @@ class VehicleMotion:
 
     def __init__(self, prepared: LinearVehicle, scheme: str, mode: Eigenmodes) -> None:
         self.prepared, self.model, self.system = prepared, prepared.model, prepared.system
-        self._scheme = scheme
+        self.scheme = scheme
         self._steps: dict[int, float] = {}
         self._allocate()
         names, known = prepared.coordinates.names, mode.linearisation.names
@@ -117,7 +117,7 @@ class VehicleMotion:
         number = math.floor(math.log(speed) / math.log(SPEED_CLASS) + 1e-9)
         for end in (number, number + 1):  # two classes share an end
             if end not in self._steps:
-                of = self.model, self.system, self.prepared.steady(SPEED_CLASS**end), self._scheme
+                of = self.model, self.system, self.prepared.steady(SPEED_CLASS**end), self.scheme
                 self._steps[end] = Stability(*of, lambda _: ()).choose(1.0 / OUTPUT_RATE)
         return min(self._steps[number], self._steps[number + 1])
 
@@ -160,7 +160,7 @@ class VehicleMotion:
     def advance(self, system: System, state: Floats, step: float, chunk: Chunk) -> int:
         """Move a state by a chunk of steps; number of records; LeftRange: it leaves the model."""
         arrays = self._work, state, self._derivative, self._stages, self._recorder
-        status, where, _, rows = time_loop(system, *arrays, SCHEMES[self._scheme], step, chunk)
+        status, where, _, rows = time_loop(system, *arrays, SCHEMES[self.scheme], step, chunk)
         if status != RUNNING:
             raise LeftRange(self.model.index.sentence(status, where))
         if not np.isfinite(state).all():

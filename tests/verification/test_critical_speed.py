@@ -15,7 +15,7 @@ from railsim.errors import ModelError
 from railsim.kernels.support import LEARNT
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.modes import modes
-from railsim.linear.stability_loss import LossOfStability
+from railsim.linear.stability_loss import LossOfStability, loss_of_stability
 from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.equilibrium import tracks_under
@@ -831,6 +831,18 @@ def test_a_branch_of_runs_is_followed_once_and_where_it_is_not_known_yet(monkeyp
     assert len(found.remarks) == 2
 
 
+def test_a_branch_begins_in_the_shape_of_the_mode_that_loses_its_stability():
+    """The lower sway of a coach whose hunting dies: the state a period later is the same one."""
+    of = LinearVehicle(load_vehicle("coach_25t"), railsim.load_track("straight"))
+    lost = loss_of_stability(of.linearised, 15.0, 20.0, points=3)
+    hunting = eigenmodes(of.linearised(20.0)).taken([-1])
+    motion = motion_of.VehicleMotion(of, "fast", hunting)
+    shooting, start = continuation._birth(motion, lost)
+    begin = np.append(start.state, [start.period, start.speed]) / shooting._scale
+    begin += 0.1 * start.tangent
+    assert np.linalg.norm(shooting._ends(begin[None])[0] - begin[:-2]) < 0.1 * 0.1
+
+
 def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest():
     """The reference body but its place along the track; rails, not what slopes have learnt."""
     of = LinearVehicle(load_vehicle("coach_manchester"), railsim.load_track("straight"))
@@ -879,7 +891,7 @@ def test_the_step_at_a_speed_that_two_classes_share_is_judged_once(monkeypatch):
     monkeypatch.setattr(motion_of, "Stability", Judge)
     motion = object.__new__(motion_of.VehicleMotion)
     motion.prepared = SimpleNamespace(steady=lambda speed: speed)
-    motion.model = motion.system = motion._scheme = None
+    motion.model = motion.system = motion.scheme = None
     motion._steps = {}
     assert motion.step_at(1.25**17.5) == motion.step_at(1.25**16.5) == 1e-3
     assert judged == [17, 18, 16]
