@@ -124,8 +124,7 @@ def _follow(
     try:
         for now in shooting.followed(before, ARC_STEP, within):
             if before.tangent[-1] * now.tangent[-1] < 0.0:
-                length = float(np.linalg.norm(now.tangent)) * ARC_STEP
-                found.folds.append(_point(shooting.fold(before, now, length)))
+                found.folds.append(_point(shooting.fold(before, now)))
             points.append(_point(now))
             before = now
     except ModelError as error:

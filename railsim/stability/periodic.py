@@ -6,13 +6,20 @@ of the system.  Newton's method solves for u = (x, T, V) with two more condition
     f(x_0) . (x - x_0) = 0        phase: no shift along the motion from the last one, x_0
     t . (u - u_0) = ds            pseudo arc length along the tangent t (Keller 1977)
 
-Between two changes s the matrix is updated with the residual r after s, J + r s^T/(s . s).
-The eigenvalues of dPhi_T/dx are the Floquet multipliers: one is 1, and the motion is stable while
-all others lie within the unit circle.  A branch that turns back in V has a fold there; of the two
+Most of a disturbance dies within a period: M = dPhi_T/dx has a far lower rank than columns.  Its
+range Z is that of M times random directions (Halko et al. 2011), and M Z Z^T differs from M only in
+what it does to disturbances outside Z.  Of these a period before each change leaves nothing, as in
+the method of Newton and Picard (Lust et al. 1998).  Between two changes the matrix is updated, with
+the residuals r' and r at both ends of the way s: J + (r - r' - J s) s^T/(s . s).
+
+The eigenvalues of M are the Floquet multipliers: one is 1, and the motion is stable while all
+others lie within the unit circle.  A branch that turns back in V has a fold there; of the two
 motions at one speed beside it, one is unstable.
 
 Sources: Broyden (1965), Mathematics of Computation 19; Keller (1977), Numerical solution of
-bifurcation and nonlinear eigenvalue problems; True and Kaas-Petersen (1983), Schupp (2004).
+bifurcation and nonlinear eigenvalue problems; True and Kaas-Petersen (1983), Schupp (2004); Lust,
+Roose, Spence and Champneys (1998), SIAM J. Sci. Comput. 19; Halko, Martinsson and Tropp (2011),
+SIAM Review 53.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,6 +27,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.optimize import brentq
 
 from railsim.arrays import Complexes, Floats
@@ -27,13 +35,17 @@ from railsim.errors import ModelError
 
 SETTLED = 1e-6  # last change of Newton's method, in scaled units
 MOST_ITERATIONS = 40
-MOST_MATRICES = 4  # formed until then; each costs as much as the flow of all components
+MOST_MATRICES = 8  # formed until then; each costs as much as some hundred iterations
 SLOW = 1.0  # ratio of two changes from which on the matrix, else updated, is formed again
 QUICK = 8  # iterations after which the next step may be longer
+RANK = 48  # random directions, twice as many where all of them are left after a period
+GONE = 1e-3  # share of a disturbance that counts as nothing after a period
 DIFFERENCE = 1e-5  # of the difference quotients, in scaled units
 MULTIPLIER = 1e-3  # by which a multiplier may exceed 1: error of difference quotients
 SMALLEST_SHARE = 1.0 / 256.0  # of the given step
 FOLD = 3e-3  # share of the arc length to which a fold is sought; its speed is of second order
+BENT = 1.4  # ratio of the way to the next motion to its arc length: 45 degrees off the tangent
+NEAR = 1e-2  # scaled units, within which the tangent tells nothing
 LEAD = 0.05  # least cosine between a tangent and the direction it is to lead in
 
 
@@ -130,7 +142,15 @@ class Shooting:
 
     def ahead(self, now: PeriodicMotion, length: float) -> tuple[PeriodicMotion, int]:
         """Return the motion one arc length further, and iterations; ModelError: none is found."""
-        return self._solved(now, now.tangent, length)
+        ahead, iterations = self._solved(now, now.tangent, length)
+        if np.linalg.norm(self._way(now, ahead)) > BENT * abs(length) + NEAR:
+            raise ModelError("the motions found are not on one branch")
+        return ahead, iterations
+
+    def _way(self, one: PeriodicMotion, other: PeriodicMotion) -> Floats:
+        """From one motion to another, scaled."""
+        begin, end = ([*each.state, each.period, each.speed] for each in (one, other))
+        return np.asarray(np.subtract(end, begin) / self._scale)
 
     def nearest(self, state: Floats, period: float, speed: float) -> PeriodicMotion:
         """Return the motion at a speed nearest to a state of a run, with a branch that slows down.
@@ -168,12 +188,17 @@ class Shooting:
         # the tangent leads on also where only the speed is given
         lead = float(now.tangent @ direction)
         u = base + now.tangent * length / lead if abs(lead) > LEAD else base + length * direction
-        matrix, change = now.matrix, np.zeros(len(u))
+        matrix, n, last = now.matrix, len(now.state), None
         before, formed = np.inf, 0
         for iteration in range(1, MOST_ITERATIONS + 1):
+            # what a period leaves is all that the matrix knows of
+            u = np.concatenate([self._ends(u[None])[0], u[n:]])
             if matrix is not None:
-                residual = self._ends(u[None])[0] - u[:-2]
-                matrix = matrix + np.outer(residual, change) / max(change @ change, 1e-30)
+                residual = self._ends(u[None])[0] - u[:n]
+                if last is not None:
+                    moved = u - last[0]
+                    wrong = residual - last[1] - matrix @ moved
+                    matrix = matrix + np.outer(wrong, moved) / max(moved @ moved, 1e-30)
             elif formed < MOST_MATRICES:
                 residual, matrix = self._periodicity(u)
                 formed += 1
@@ -187,6 +212,7 @@ class Shooting:
             size = float(np.linalg.norm(change))
             if not size < 10.0 * abs(length) + 1.0:
                 break
+            last = u, residual
             u = u + change
             if size < SETTLED:
                 _, matrix = self._periodicity(u)
@@ -196,9 +222,9 @@ class Shooting:
             before = size
         raise ModelError("the search for a periodic motion does not converge")
 
-    def fold(self, before: PeriodicMotion, after: PeriodicMotion, length: float) -> PeriodicMotion:
-        """Return the motion where the branch turns back between two, some `length` of arc apart."""
-        found = {}
+    def fold(self, before: PeriodicMotion, after: PeriodicMotion) -> PeriodicMotion:
+        """Return the motion where the branch turns back between two."""
+        found, length = {}, float(self._way(before, after) @ before.tangent)
 
         def forward(share: float) -> float:
             if share not in found:
@@ -206,10 +232,13 @@ class Shooting:
             return float(found[share].tangent[-1])
 
         first = 1e-6 * length
-        if forward(first) * forward(length) > 0.0:  # of a fold with a kink: the nearer motion
+        try:
+            if forward(first) * forward(length) > 0.0:  # of a fold with a kink: the nearer motion
+                return after
+            root = float(brentq(forward, first, length, xtol=FOLD * length))
+            forward(root)
+        except ModelError:  # which is no reason not to go on from it
             return after
-        root = float(brentq(forward, first, length, xtol=FOLD * length))
-        forward(root)
         return found[root]
 
     def _ends(self, rows: Floats) -> Floats:
@@ -220,12 +249,32 @@ class Shooting:
         return np.asarray(ends / self._scale[:n])
 
     def _periodicity(self, u: Floats) -> tuple[Floats, Floats]:
-        """Residual x(T) - x and its Jacobian over the scaled u, all scaled."""
-        n = len(u) - 2
-        ends = self._ends(np.vstack([u, u + DIFFERENCE * np.eye(n + 2)]))
-        matrix = (ends[1:] - ends[0]).T / DIFFERENCE
-        matrix[:, :n] -= np.eye(n)
-        return ends[0] - u[:n], matrix
+        """Residual x(T) - x and its Jacobian over the scaled u, all scaled.
+
+        The range is sought anew each time: where contacts change it turns within one step.
+        """
+        n, chosen = len(u) - 2, np.random.default_rng(0)
+        tried = chosen.standard_normal((n, RANK))
+        while 2 * tried.shape[1] < n:
+            tried = np.linalg.qr(tried)[0]
+            directions, sizes, _ = np.linalg.svd(self._slopes(u, tried)[1], full_matrices=False)
+            if sizes[-1] < GONE:
+                tried = directions[:, sizes > GONE]
+                break
+            tried = chosen.standard_normal((n, 2 * tried.shape[1]))
+        else:
+            tried = np.eye(n)
+        end, slopes = self._slopes(u, tried)
+        matrix = np.hstack([slopes[:, :-2] @ tried.T - np.eye(n), slopes[:, -2:]])
+        return end - u[:n], matrix
+
+    def _slopes(self, u: Floats, directions: Floats) -> tuple[Floats, Floats]:
+        """x(T) and its slopes in some directions of x, one a column, and over T and V, scaled."""
+        rows = block_diag(directions.T, np.eye(2))
+        ends = self._ends(np.vstack([u, u + DIFFERENCE * rows]))
+        if not np.isfinite(ends).all():
+            raise ModelError("the motion leaves the range of the model")
+        return ends[0], (ends[1:] - ends[0]).T / DIFFERENCE
 
     def _motion(self, u: Floats, matrix: Floats, along: Floats, before: Floats) -> PeriodicMotion:
         """Return what was found at u; the tangent goes on in the sense of the one before."""

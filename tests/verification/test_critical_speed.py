@@ -744,7 +744,7 @@ class Parabola:
             yield now
             inside = within(now)
 
-    def fold(self, before, after, length):
+    def fold(self, before, after):
         assert before.p < 2.0 < after.p
         return self.at(2.0)
 

@@ -91,11 +91,11 @@ def test_a_branch_has_motions_periods_and_multipliers_of_the_closed_form(branch)
 def test_the_fold_is_where_the_closed_form_turns_back(branch):
     shooting, _, motions = branch
     (k,) = (k for k, m in enumerate(motions[1:]) if motions[k].tangent[-1] < 0.0 < m.tangent[-1])
-    fold = shooting.fold(motions[k], motions[k + 1], 0.5)
+    fold = shooting.fold(motions[k], motions[k + 1])
     assert fold.speed == pytest.approx(45.0, abs=1e-4)
     assert is_known(fold) == pytest.approx(0.5, abs=2e-3)
     # two motions on one side of it have none between them
-    assert shooting.fold(motions[k + 1], motions[k + 2], 0.5) is motions[k + 2]
+    assert shooting.fold(motions[k + 1], motions[k + 2]) is motions[k + 2]
 
 
 @pytest.mark.parametrize(("speed", "share"), [(46.0, 0.723607), (48.0, 0.887298), (48.0, 0.112702)])
@@ -115,6 +115,59 @@ def test_the_motion_nearest_to_that_of_a_run_is_found_from_any_phase(branch, spe
     near = shooting.at_speed(found, speed + 0.5)
     assert near.speed == pytest.approx(speed + 0.5)
     is_known(near)
+
+
+class Hidden(AmplitudeEquation):
+    """The same motions among 200 members that decay at 3/s to 80/s, all mixed by a rotation."""
+
+    def __init__(self):
+        self.decay = np.linspace(DECAY, 80.0, 200)
+        self.mixed = np.linalg.qr(np.random.default_rng(1).standard_normal((202, 202)))[0]
+        self.flows = 0
+
+    def after(self, states, durations, speeds):
+        self.flows += len(states)
+        own = states @ self.mixed
+        own[:, :2] = super().after(own[:, :3], durations, speeds)[:, :2]
+        own[:, 2:] *= np.exp(-np.outer(durations, self.decay))
+        return own @ self.mixed.T
+
+    def amplitude(self, state, duration, speed):
+        return super().amplitude(state @ self.mixed, duration, speed)
+
+
+def test_what_dies_within_a_period_takes_no_flows():
+    """X = 0.887298; a tenth of all members is left after a period with 1 % and more."""
+    flow, X = Hidden(), 0.887298
+    shooting = Shooting(flow, np.full(202, 1e-3), period_scale=0.02, speed_scale=1.0)
+    run = np.concatenate([[1.05 * A0 * np.sqrt(X)], np.zeros(201)]) @ flow.mixed.T
+    found = shooting.nearest(run, 0.49, 48.0)
+    assert flow.flows < 202  # of one matrix by differences of all members
+    assert found.amplitude == pytest.approx(A0 * np.sqrt(X), rel=1e-5)
+    assert found.period == pytest.approx(2.0 * np.pi / (OMEGA * (1.0 + 0.1 * X)), rel=1e-5)
+    own = np.exp(RATE * (2.0 * X - 4.0 * X * X) * found.period)
+    known = np.sort(np.append(np.exp(-flow.decay * found.period), own))[::-1]
+    left = np.sort(np.abs(found.multipliers))[::-1]
+    assert left[:20] == pytest.approx(known[:20], abs=1e-3)
+
+
+def test_a_motion_off_the_tangent_is_on_another_branch(monkeypatch, branch):
+    """By 45 degrees and more: a shorter step is tried."""
+    shooting, start, motions = branch
+    monkeypatch.setattr(shooting, "_solved", lambda *_: (motions[0], 5))
+    assert shooting.ahead(start, 0.5) == (motions[0], 5)
+    with pytest.raises(ModelError, match="not on one branch"):
+        shooting.ahead(start, 0.3)
+
+
+def test_a_fold_beside_which_no_motion_is_found_is_the_motion_after_it(monkeypatch, branch):
+    shooting, _, motions = branch
+
+    def ahead(now, length):
+        raise ModelError("no motion")
+
+    monkeypatch.setattr(shooting, "ahead", ahead)
+    assert shooting.fold(motions[0], motions[1]) is motions[1]
 
 
 def test_below_the_fold_no_motion_is_found(branch):
