@@ -56,17 +56,23 @@ def followed_branches(
     `lost`: of rest, with the runs' own creep law; `known`: branches of runs; `speeds`: range [m/s].
     """
     found = Continued()
+    pieces = [piece for one in known if one.direction in RUNS for piece in one.pieces()]
+    pieces.sort(key=lambda piece: piece[0].speed)  # of two on one branch first the longer one
+
+    def telling(number: int) -> Progress:
+        return lambda share: progress((number + share) / (1.0 + len(pieces)))
+
     if lost.parameter is None:
         found.remarks.append("continuation: no loss of stability at which it could begin")
     else:
-        _follow(found, partial(_birth, motion, lost), speeds, "the branch of small motions")
+        born = partial(_birth, motion, lost)
+        _follow(found, born, speeds, "the branch of small motions", telling(0))
         if found.branches:
             found.begins = found.branches[0].points[0]
-    pieces = [piece for one in known if one.direction in RUNS for piece in one.pieces()]
-    pieces.sort(key=lambda piece: piece[0].speed)  # of two on one branch first the longer one
     tried: list[Sequence[Point]] = []
-    for number, piece in enumerate(pieces):
-        progress((1.0 + number) / (1.0 + len(pieces)))
+    for number, piece in enumerate(pieces, start=1):
+        tell = telling(number)
+        tell(0.0)
         seed = next((p for p in piece if p.speed >= piece[0].speed + FROM_END), piece[-1])
         lines = [branch.points for branch in found.branches]
         if seed.amplitude < FIRST or _is_covered(seed, [*lines, *tried]):
@@ -76,7 +82,7 @@ def followed_branches(
             f"the branch of runs from {piece[0].speed:.4g} to {piece[-1].speed:.4g} m/s, "
             f"{1e3 * seed.amplitude:.2f} mm at {seed.speed:.4g} m/s,"
         )
-        _follow(found, partial(_at, motion, seed), speeds, name)
+        _follow(found, partial(_at, motion, seed), speeds, name, tell)
     found.branches = [settled_to(branch, pieces) for branch in found.branches]
     return found
 
@@ -108,6 +114,7 @@ def _follow(
     start: Callable[[], tuple[Shooting, PeriodicMotion]],
     speeds: tuple[float, float],
     name: str,
+    tell: Progress,
 ) -> None:
     """Add the branch from a motion on, or a remark on why it ends."""
     points: list[Point] = []
@@ -126,6 +133,7 @@ def _follow(
             if before.tangent[-1] * now.tangent[-1] < 0.0:
                 found.folds.append(_point(shooting.fold(before, now)))
             points.append(_point(now))
+            tell(len(points) / MOST_MOTIONS)
             before = now
     except ModelError as error:
         found.remarks.append(
@@ -194,6 +202,11 @@ def _why(motion: VehicleMotion, seed: Point) -> str:
 
 def _birth(motion: VehicleMotion, lost: LossOfStability) -> tuple[Shooting, PeriodicMotion]:
     """The branch at the bifurcation; its first shape is that of a small motion in the time loop."""
+    if motion.prepared.sticking:
+        raise ModelError(
+            "friction elements that stick keep any force, so that no periodic motion stands alone "
+            "(ramp and bifurcation find what runs settle to)"
+        )
     speed = float(lost.parameter or 0.0)
     frequency = float(lost.modes[0].frequencies[0])
     period = 1.0 / frequency

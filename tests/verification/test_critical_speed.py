@@ -823,7 +823,8 @@ def test_a_branch_of_runs_is_followed_once_and_where_it_is_not_known_yet(monkeyp
     seeds = []
     found, told = continued(monkeypatch, Parabola(), known, seeds)
     assert seeds == [pytest.approx((62.0, 1.5 * on)), pytest.approx((62.0, 2.1 * on))]
-    assert told == pytest.approx(np.arange(1, 7) / 7.0)
+    # 7 motions of 20 at most on the branch from rest, then each of the other branches
+    assert told == pytest.approx(np.concatenate([np.arange(1, 8) / 20.0, np.arange(1, 7)]) / 7.0)
     said = (
         f"continuation: the branch of runs from 61 to 63.5 m/s, {1.5e3 * on:.2f} mm at 62 m/s, is"
     )
@@ -841,6 +842,17 @@ def test_a_branch_begins_in_the_shape_of_the_mode_that_loses_its_stability():
     begin = np.append(start.state, [start.period, start.speed]) / shooting._scale
     begin += 0.1 * start.tangent
     assert np.linalg.norm(shooting._ends(begin[None])[0] - begin[:-2]) < 0.1 * 0.1
+
+
+def test_no_branch_of_small_motions_is_sought_where_friction_sticks():
+    """Stuck elements keep any force, with a multiplier of 1 each: shooting has no answer."""
+    motion = SimpleNamespace(prepared=SimpleNamespace(sticking=12))
+    lost, told = SimpleNamespace(parameter=33.0), []
+    found = continuation.followed_branches(motion, lost, [], (5.0, 60.0), told.append)
+    (said,) = found.remarks
+    assert said.startswith("continuation: the branch of small motions is not followed: friction")
+    assert "bifurcation" in said
+    assert not found.branches
 
 
 def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest():
