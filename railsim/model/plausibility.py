@@ -6,7 +6,7 @@ on their springs with the wheelsets held, and how the weight is shared by the su
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,7 @@ from railsim.constants import FASTEST
 from railsim.contact.gauges import wheel_gauge
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.base import Remark, kept
-from railsim.definitions.elements.base import Element, FreeLength
+from railsim.definitions.elements.base import Element, FreeLength, two_sided
 from railsim.definitions.elements.friction import SideBearer
 from railsim.definitions.elements.springs import BumpStop, SpringDamper
 from railsim.definitions.track.check_rail import CheckRail
@@ -236,7 +236,9 @@ def _lengths(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterat
 def _travel(element: Element) -> float:
     """How far an element moves before it acts: clearance, or free travel of a stop [m]."""
     if isinstance(element, BumpStop):
-        return min((abs(x) for x, force in element.table if force != 0.0), default=math.inf)
+        rows = two_sided(element.table)
+        ends = [abs(y if f else x) for (x, f), (y, g) in pairwise(rows) if bool(f) != bool(g)]
+        return min(ends, default=0.0 if rows[0][1] else math.inf)
     return element.clearance if isinstance(element, SideBearer) else 0.0
 
 

@@ -117,7 +117,7 @@ def test_admissible_speed_in_kilometres_per_hour_is_remarked():
         (
             vehicle(stop={**STOP, "table": [[0.0, 0.0], [20.0, 0.0], [30.0, 5e3]]}),
             "stop.left, stop.right",
-            "no force before 30 m of travel: is it in m?",
+            "no force before 20 m of travel: is it in m?",
         ),
         (vehicle(body={"position": [0.0, 0.0, -12.0]}), "frame", "up to 12 m above the rails"),
         (
@@ -174,6 +174,104 @@ def test_admissible_speed_in_kilometres_per_hour_is_remarked():
 def test_slips_of_sign_and_unit_are_remarked(unusual, names, words):
     found = vehicle_remarks(unusual)
     assert any(names in remark.key and words in remark.text for remark in found), found
+
+
+def springs(frequency, ratio=0.2):
+    """Two springs on which the frame has a frequency [Hz] and a damping ratio."""
+    omega, mass = 2.0 * np.pi * frequency, BODY["mass"]
+    each = {"stiffness": 0.5 * mass * omega**2, "damping": ratio * mass * omega}
+    return vehicle(spring={key: [0.0, 0.0, value] for key, value in each.items()})
+
+
+def wheels(load):
+    """With a mean wheel load [N] on two wheels."""
+    return vehicle(body={"mass": 2.0 * load / 9.81 - AXLE["mass"]})
+
+
+def radii_of_gyration(x):
+    return vehicle(body={"inertia": [BODY["mass"] * x**2] * 3})
+
+
+def third_inertia(ratio):
+    """Izz over the sum of Ixx and Iyy."""
+    return vehicle(body={"inertia": [5e3, 9e3, ratio * 14e3]})
+
+
+def at(**points):
+    """A point of a spring elsewhere: `x` along the vehicle, `y` to the right [m]."""
+    x, y = points.get("x", 0.0), points.get("y", 1.0)
+    return vehicle(spring={"points": [[x, y, -0.9], [x, y, -0.6]]})
+
+
+def stop_after(travel):
+    """To one side; to the other a tenth later."""
+    rows = [[-2.0 * travel, -5e3], [-1.1 * travel, 0.0], [travel, 0.0], [2.0 * travel, 5e3]]
+    return vehicle(stop={**STOP, "table": rows})
+
+
+def slide(coefficient):
+    stick = {"friction_coefficient": [coefficient] * 3, "stick_stiffness": [4e6] * 3}
+    where = {"points": None, "point": [0.0, 1.0, -0.46]}
+    return vehicle(spring={"kind": "friction", **where, **stick})
+
+
+def wheel(radius):
+    return vehicle(axle={"radius": radius, "position": [0.0, 0.0, -radius]})
+
+
+def damper(damping):
+    return vehicle(damper={**DAMPER, "damping": damping})
+
+
+def service(speed):
+    return vehicle().replace(service={"admissible_speed": speed, "cant_deficiency": 0.1})
+
+
+WEIGHT = 4e3 * 9.81  # of the frame on each of the two springs [N]
+LIMITS = {  # how a vehicle has some value, what it is called, the last usual value, one beyond it
+    "slow": (springs, "bounces at", 0.301, 0.299),
+    "quick": (springs, "bounces at", 9.99, 10.01),
+    "steel": (springs, "vibrates at", 499.0, 501.0),
+    "damped": (lambda x: springs(1.0, x), "of its bounce", 1.499, 1.501),
+    "light": (wheels, "mean static wheel load", 8.01e3, 7.99e3),
+    "heavy": (wheels, "mean static wheel load", 249e3, 251e3),
+    "far": (lambda x: at(y=x), "from the origin", 499.0, 501.0),
+    "high": (lambda x: vehicle(body={"position": [0.0, 0.0, -x]}), "above the rails", 7.99, 8.01),
+    "not at the axle": (lambda x: at(x=x), "acts on axle from", 1.499, 1.501),
+    "loose": (stop_after, "no force before", 0.999, 1.001),
+    "small wheel": (wheel, "wheel radius", 0.101, 0.099),
+    "large wheel": (wheel, "wheel radius", 1.199, 1.201),
+    "wide": (lambda x: vehicle(axle={"back_to_back": x}), "back_to_back", 2.499, 2.501),
+    "flat": (third_inertia, "of the other two", 1.299, 1.301),
+    "compact": (radii_of_gyration, "radius of gyration", 0.0501, 0.0499),
+    "long": (radii_of_gyration, "radius of gyration", 14.99, 15.01),
+    "weak": (damper, "railways have 4e3", 201.0, 199.0),
+    "stiff": (damper, "railways have 4e3", 9.99e6, 1.001e7),
+    "lagging": (  # 15 kN s/m give way within 1 s
+        lambda x: vehicle(damper={**DAMPER, "series_stiffness": x}), "in series", 15.1e3, 14.9e3,
+    ),
+    "rough": (slide, "coefficient of friction", 0.999, 1.001),
+    "fast": (service, "is the speed in m/s?", 124.0, 126.0),
+    "little load": (
+        lambda x: vehicle(spring={"load_at_length": [WEIGHT / x, 0.3]}),
+        "its length was measured under", 0.601, 0.599,
+    ),
+    "much load": (
+        lambda x: vehicle(spring={"load_at_length": [WEIGHT / x, 0.3]}),
+        "its length was measured under", 1.499, 1.501,
+    ),
+    "coil-bound": (  # of a free length of 0.4 m
+        lambda x: vehicle(spring={"free_length": 0.4, "stiffness": [2e6, 2e6, WEIGHT / x / 0.4]}),
+        "coil-bound", 0.699, 0.701,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("made", "words", "usual", "unusual"), LIMITS.values(), ids=LIMITS)
+def test_a_remark_begins_at_its_limit(made, words, usual, unusual):
+    """Each on the value and no other: the last usual one is not said, one nearby is."""
+    assert not [r.text for r in vehicle_remarks(made(usual)) if words in r.text]
+    assert [r.text for r in vehicle_remarks(made(unusual)) if words in r.text]
 
 
 def test_springs_below_a_held_body_carry_it():
@@ -427,6 +525,10 @@ def test_twenty_equal_faults_are_one_line_with_a_count(command, tmp_path, capsys
         (1.668, 1.590, True),
         (1.5, 1.360, False),  # a wheelset for 1435 mm still stands on these rails
         (1.435, 1.400, False),
+        (1.435, 1.389, True),  # 46 mm; railways have 45 to 115 mm
+        (1.435, 1.391, False),
+        (1.435, 1.321, True),
+        (1.435, 1.319, False),
     ],
 )
 def test_wheelset_of_another_gauge_is_remarked_on(gauge, backs, usual):
