@@ -1,5 +1,7 @@
 """Equilibria and stable steps on disk: found once, the same to the last bit, bounded."""
 
+import json
+import os
 from collections import Counter
 from contextlib import contextmanager
 
@@ -112,9 +114,16 @@ def test_damaged_solution_is_found_again(folder, solved, monkeypatch):
 def test_number_of_solutions_is_bounded(folder, monkeypatch):
     monkeypatch.setattr(solutions, "MOST_STORED", 10)
     monkeypatch.setattr(solutions, "MOST_NEW", 25)  # one process leaves room for others
+    left = []
     for number in range(30):
-        solutions.solution("test", str(number), lambda: {})
-        assert len(list(folder.glob("*.json"))) <= 10
+        solutions.solution("test", str(number), lambda number=number: {"number": number})
+        left.append(set())
+        for path in folder.glob("*.json"):
+            left[-1].add(found := json.loads(cache.stored(path))["number"])
+            os.utime(path, (found, found))  # as old as its number says
+    assert left[9] == {*range(10)}
+    assert left[10] == {*range(5, 11)}  # the older half makes room
+    assert max(map(len, left)) == 10
     assert solutions._new.total() == 25
 
 

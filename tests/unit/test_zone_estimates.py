@@ -197,17 +197,21 @@ def test_a_limit_that_falls_below_zero_is_exceeded():
     assert all(row.exceeded for row in rows)
 
 
-def test_regression_over_several_influences_is_that_of_the_normal_equations():
-    """Standard error with N - k - 1 degrees of freedom; share of the variance explained."""
+@pytest.mark.parametrize("n", [9, 5, 4])
+def test_regression_over_several_influences_is_that_of_the_normal_equations(n):
+    """Standard error with N - k - 1 degrees of freedom, none without; share of the variance."""
     random = np.random.default_rng(3)
-    x, y = random.normal(size=(9, 3)) * [1.0, 1e-3, 50.0], random.normal(size=9)
+    x, y = random.normal(size=(n, 3)) * [1.0, 1e-3, 50.0], random.normal(size=n)
     target = np.array([0.5, 2e-3, -30.0])
-    design = np.column_stack([np.ones(9), x])
+    if n == 4:
+        assert multiple_regression(x, y, target) is None
+        return
+    design = np.column_stack([np.ones(n), x])
     b = np.linalg.solve(design.T @ design, design.T @ y)
     rest = y - design @ b
     found = multiple_regression(x, y, target)
     assert found.coefficients == pytest.approx(b)
-    assert found.error == pytest.approx(np.sqrt(rest @ rest / (9 - 3 - 1)))
+    assert found.error == pytest.approx(np.sqrt(rest @ rest / (n - 3 - 1)))
     assert found.determination == pytest.approx(1.0 - rest @ rest / np.sum((y - y.mean()) ** 2))
     assert found.value == pytest.approx(b[0] + target @ b[1:])
 
