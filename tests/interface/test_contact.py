@@ -12,8 +12,15 @@ from PIL import Image
 from railsim import cli
 from railsim.contact import contact_geometry
 from railsim.contact.gauges import gauge_table, wheel_gauge
-from railsim.contact.summary import Pair
-from railsim.contact.tables import printed_conicity
+from railsim.contact.summary import ContactSummary, Pair
+from railsim.contact.tables import (
+    conicity_map_table,
+    conicity_table,
+    function_table,
+    patch_table,
+    printed_conicity,
+    printed_functions,
+)
 from railsim.plot.contact import profiles_figure
 from railsim.profiles import Profile, load_profile
 
@@ -354,3 +361,69 @@ def test_an_amplitude_without_an_oscillation_is_shown():
     assert "-: no oscillation with this amplitude" in caption
     assert heading.split()[2:] == ["1", "2", "3"]
     assert values.split()[1] == "-"
+
+
+@pytest.mark.parametrize("without", range(9))
+def test_caption_speaks_of_the_amplitudes_that_are_printed(without):
+    """Whole millimetres of 0.5 to 4.5 mm; halves are in the file only."""
+    conicity = np.where(np.arange(9) == without, np.nan, 0.1)
+    found = SimpleNamespace(amplitudes=1e-3 * np.arange(0.5, 4.6, 0.5), conicity=conicity)
+    printed = printed_conicity(found)
+    whole = [1, 3, 5, 7]
+    assert ("no oscillation" in printed.caption) == (without in whole)
+    assert printed.texts()[0][1:] == ["-" if k == without else "0.100" for k in whole]
+
+
+def test_each_quantity_stands_in_its_unit():
+    """A summary of plain numbers: 1, 2, 3 ... mm, mrad, kN by the columns."""
+    sides = {
+        "rolling_radius": (461e-3, 459e-3), "contact_angle": np.radians([2.0, 3.0]),
+        "contact_y": (4e-3, 5e-3), "wheel_y": (6e-3, 7e-3),
+    }  # fmt: skip
+    places = {name: np.array([each]) for name, each in sides.items()}
+    alone = {"lateral": np.array([1e-3]), "delta_r": np.array([2e-3]), "roll": np.array([8e-3])}
+    patch = SimpleNamespace(
+        N=60e3, N_z=59e3, N_y=5e3, y=9e-3, angle=np.radians(1.5), length=11e-3, width=12e-3,
+        area=104e-6, p_max=900e6, zone="tread",
+    )  # fmt: skip
+    solved = SimpleNamespace(patches=[patch], z=0.01e-3)
+    found = ContactSummary(
+        pairs=(None, None), radii=(0.46, 0.46), load=64e3, normal="hertz",
+        geometry=SimpleNamespace(**places, **alone),
+        amplitudes=1e-3 * np.arange(0.5, 2.1, 0.5), conicity=np.array([0.1, 0.2, 0.3, 0.4]),
+        contacts={2e-3: solved}, exact={2e-3: solved},
+    )  # fmt: skip
+
+    def shown(table, row=0):
+        texts = table.texts()[row]
+        return {c.name: f"{t} {c.unit}".strip() for c, t in zip(table.columns, texts, strict=True)}
+
+    assert shown(function_table(found)) == {
+        "lateral": "1.00 mm", "delta_r": "2.000 mm",
+        "rolling_radius_left": "461.000 mm", "rolling_radius_right": "459.000 mm",
+        "contact_angle_left": "2.00 deg", "contact_angle_right": "3.00 deg",
+        "contact_y_left": "4.00 mm", "contact_y_right": "5.00 mm",
+        "wheel_y_left": "6.00 mm", "wheel_y_right": "7.00 mm", "roll": "8.000 mrad",
+    }  # fmt: skip
+    assert list(shown(printed_functions(found))) == [n for n in NAMES if "contact_y" not in n]
+    assert shown(conicity_table(found), 1) == {"amplitude": "1 mm", "equivalent_conicity": "0.200"}
+    over_gauge = conicity_map_table(found, [1.4355], np.array([found.conicity]))
+    assert shown(over_gauge) == {"gauge": "1435.5 mm", "amplitude 1 mm": "0.200",
+                                 "amplitude 2 mm": "0.400"}  # fmt: skip
+    patches = patch_table(found)
+    assert "under 64 kN" in patches.caption
+    for row, method, zone in ((0, "table", "tread"), (1, "exact", "")):
+        assert shown(patches, row) == {
+            "lateral": "2.00 mm", "method": method, "zone": zone, "N": "60.0 kN", "Q": "59.0 kN",
+            "Y": "5.0 kN", "contact_y": "9.00 mm", "contact_angle": "1.5 deg", "length": "11.0 mm",
+            "width": "12.0 mm", "area": "104 mm2", "p_max": "900 MPa", "z": "0.010 mm",
+        }  # fmt: skip
+
+
+def test_some_lines_of_the_contact_functions_are_printed():
+    """Of 201 each tenth: 21, both ends among them; of 15 all."""
+    for count, printed in ((201, 21), (15, 15)):
+        y = np.linspace(-0.01, 0.01, count)
+        functions = {name: y for name in NAMES}
+        lines = printed_functions(SimpleNamespace(functions=functions))["lateral"]
+        assert lines == pytest.approx(np.linspace(-0.01, 0.01, printed).tolist())
