@@ -95,7 +95,7 @@ def on_grid(s: Floats, values: Floats, grid: Floats) -> Floats:
     """
     step, own = grid[1] - grid[0], float(np.median(np.diff(s)))
     if own < step:
-        n = min(2 * int(HALF * step / own) + 1, 2 * (len(s) // 2) - 1)
+        n = 2 * int(HALF * step / own) + 1
         taps, pad = firwin(n, own / step, window=("kaiser", SHAPE)), n // 2
         ends = 2.0 * values[0] - values[pad:0:-1], 2.0 * values[-1] - values[-2 : -pad - 2 : -1]
         values = oaconvolve(np.concatenate([ends[0], values, ends[1]]), taps, mode="valid")

@@ -8,7 +8,7 @@ from railsim.definitions.loading import load_mechanism
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.checks import checks
-from railsim.mechanisms.judgement import Judge, Judgement
+from railsim.mechanisms.judgement import Judge, Judgement, firm
 from railsim.mechanisms.kinematics import folded, solve
 from railsim.mechanisms.optimisation import _least_breach, optimise
 from railsim.mechanisms.optimum import Start, best_of
@@ -366,6 +366,27 @@ def test_the_least_angle_is_that_between_the_positions(tmp_path):
     result = analyse(load_mechanism(path))
     exact = np.pi / 2 - np.arcsin(0.1 / 0.3)
     assert result.min_angles["mu"] == pytest.approx(exact, abs=1e-9)
+
+
+def test_a_search_weighs_objective_and_breaches():
+    """(1 - x)^2 + (2 + y)^2 + x at 0; breaches count from 0, ten more where nothing moves."""
+    slopes, loose = np.zeros((3, 2)), np.zeros(3, dtype=bool)
+    for margins, fixed, breach in (
+        ([0.2, 0.1, 0.3], loose, 0.0),
+        ([0.2, -0.3, -0.1], loose, 0.3),
+        ([0.2, -0.3, -0.1], loose | [True, False, False], 0.3),
+        ([0.2, -0.3, -0.1], loose | [False, False, True], 10.1),
+        ([0.2, -0.3, -1e-8], loose | [False, False, True], 0.3),  # kept, but for round-off
+    ):
+        judged = Judgement(
+            np.array([1.0, 2.0]), np.diag([-1.0, 1.0]), 0.0, np.array([1.0, 0.0]),
+            np.array(margins), slopes, firm=fixed,
+        )  # fmt: skip
+        assert judged.violation == pytest.approx(breach)
+        assert judged.objective == pytest.approx(5.0)
+        assert judged.gradient == pytest.approx([-1.0, 4.0])
+    names = ("dead_point", "lift_stroke", "max_stroke", "driver_dead_point", "min_force")
+    assert [firm(name) for name in names] == [True, True, False, True, False]
 
 
 def test_least_breach_is_found_where_limits_exclude_each_other_or_one_cannot_be_met():

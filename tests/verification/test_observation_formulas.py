@@ -102,6 +102,14 @@ def test_a_grid_shows_waves_of_two_steps_and_more(wave, passed):
     assert shares == pytest.approx(passed, abs=0.02)
 
 
+@pytest.mark.parametrize("own", [0.02, 0.11, 0.25, 0.4])
+def test_a_grid_shows_straight_lines_up_to_both_ends(own):
+    """Weights that are symmetric and add up to 1, and ends continued antisymmetrically."""
+    s = 10.0 + own * np.arange(round(60.0 / own))
+    grid = np.arange(10.0, s[-1], STEP)
+    np.testing.assert_allclose(on_grid(s, 3.0 - 0.2 * s, grid), 3.0 - 0.2 * grid, atol=1e-9)
+
+
 def test_spectra_have_the_power_of_the_signal_whatever_is_left_out():
     """Of white noise its variance; the mean does not count."""
     random = np.random.default_rng(1)
