@@ -8,19 +8,33 @@ import pytest
 
 import railsim
 from railsim.kernels import vibration as kernel
+from railsim.kernels.actuators import ABOUT, ACTION, BY_DAMPER, BY_FORCE, COMMAND, LARGEST, MODE
 from railsim.kernels.contact_columns import W_Q, WHEEL_COLUMNS
 from railsim.kernels.support import MOST_CORRECTIONS
-from railsim.kernels.vibration import AMPLITUDE, FREQUENCY, VIBRATION
+from railsim.kernels.vibration import (
+    ALTERNATES_AT,
+    ALTERNATION,
+    AMPLITUDE,
+    FREQUENCY,
+    POSITION,
+    VIBRATION,
+)
 from railsim.result.stored import lost_peak
 from railsim.simulation.preparation import begins_on_sections
 from railsim.simulation.remarks import (
+    alternation,
     beyond_experience,
+    commanded_dampers,
     creep_range,
     ended_by_the_track,
+    evaluated_whole,
+    lifted_wheels,
     stability,
+    uneven_wheels_on,
     unsettled_rails,
     vibration,
     vibration_cause,
+    yaw_range,
 )
 
 
@@ -179,3 +193,140 @@ def test_a_run_that_begins_on_changing_rails_says_so(start, names):
     model = Record(system=under, index=index, rails=Record(ends=rails))
     found = "".join(begins_on_sections(model, start))
     assert (f"begins with {names} within a range" in found) == bool(names)
+
+
+# limits, each from both sides --------------------------------------------------------------------
+
+
+Q0 = np.full((2, 2), 60e3)
+NAMES = ("front", "rear")
+
+
+def placed(name, values):
+    """Extremes by name, each at t = 1.5 s and s = 30 m."""
+    places = {"_time": 1.5, "_distance": 30.0}
+    return {name: values, **{name + end: np.full_like(values, x) for end, x in places.items()}}
+
+
+@pytest.mark.parametrize(("times", "said"), [(4.99, False), (5.01, True)])
+def test_wheel_loads_beyond_five_times_the_static_one_are_told(times, said):
+    loads = np.zeros((2, 2, 2))
+    loads[0, 1, 0] = times * 60e3
+    extremes = placed("Q", loads) | placed("sum_Y", np.zeros((2, 2)))
+    words = "".join(beyond_experience(extremes, Q0, NAMES))
+    assert ("The largest Q is 5.01 times" in words and "rear, left, t = 1.50 s" in words) == said
+
+
+@pytest.mark.parametrize(
+    ("unloaded", "before", "words"),
+    [
+        ({}, {}, ""),
+        ({(1, 0): 0.004}, {}, "rear, left, for 4 ms altogether (first at t = 1.50 s, s = 30.0 m)."),
+        ({(0, 1): 0.003, (1, 1): 0.005}, {}, "rear, right, for 5 ms altogether (first at t = 1.50 s"
+         ", s = 30.0 m); 2 wheels in all were off their rails."),
+        # all of it before the evaluation of peaks began, and not all
+        ({(1, 0): 0.004}, {(1, 0): 0.004}, "s = 30.0 m); all within the start of the run, which "
+         "tables of peaks leave out."),
+        ({(1, 0): 0.004}, {(1, 0): 0.003}, "s = 30.0 m)."),
+    ],
+)  # fmt: skip
+def test_the_wheel_that_is_off_its_rail_for_longest_is_named(unloaded, before, words):
+    times, first = np.zeros((2, 2)), np.zeros((2, 2))
+    for known, into in ((unloaded, times), (before, first)):
+        for at, seconds in known.items():
+            into[at] = seconds
+    said = lifted_wheels(placed("Q", np.zeros((2, 2, 2))), times, first, NAMES)
+    assert said.endswith(words)
+    assert bool(said) == bool(words)
+
+
+@pytest.mark.parametrize(
+    ("moved", "duration", "said"),
+    [(9e-6, 1.01, True), (-9e-6, 1.01, True), (11e-6, 1.01, False), (9e-6, 0.99, False)],
+)
+def test_a_test_of_stability_takes_a_second_and_a_disturbance_of_ten_micrometres(
+    moved, duration, said
+):
+    found = stability(None, {"wheelset_lateral": np.array([[moved, 0.0]])}, duration)
+    assert ("proves nothing" in found) == said
+
+
+@pytest.mark.parametrize(("divided", "share"), [(0, 0.005), (1, 0.02)])
+def test_forces_that_alternate_are_told_from_a_share_of_the_wheel_load(divided, share):
+    """Forces +A, -A, +A: the square of their second difference, 4 A, is what is measured."""
+    for times, said in ((0.99, False), (1.01, True)):
+        measured = np.zeros((2, 2, VIBRATION))
+        measured[1, 1, [ALTERNATION, ALTERNATES_AT]] = (4.0 * times * share * 60e3) ** 2, 75.0
+        found = alternation(measured, Q0, NAMES, divided)
+        assert bool(found) == said
+        if said:
+            assert "guiding force of the right wheel of rear alternates" in found
+            assert f"by {1e-3 * times * share * 60e3:.1f} kN, vehicle at s = 75 m" in found
+    assert alternation(np.zeros((0, 2, VIBRATION)), Q0, NAMES, divided) == ""
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.049, False), (0.051, True)])
+def test_vibrations_are_told_from_a_twentieth_of_the_wheel_load(share, said):
+    measured = np.zeros((2, 2, VIBRATION))
+    measured[0, 1, [AMPLITUDE, FREQUENCY, POSITION]] = share * 60e3, 80.0, 12.0
+    for elastic in (False, True):
+        found = vibration(measured, Q0, NAMES, "x", elastic=elastic)
+        assert (
+            "at 80 Hz" in found and "right wheel of front, vehicle at s = 12 m" in found
+        ) == said
+        assert ("makes them elastic" in found) == (said and not elastic)
+
+
+@pytest.mark.parametrize(
+    ("about", "body", "most", "unit"),
+    [  # body 0 of 2 t and 500, 900, 1000 kg m2 and body 1 of half of all; the lighter one counts
+        ("y", (0, 0), 0.3 * 2000.0 / 1e-3, "N s/m"), ("x", (0, 1), 0.3 * 1000.0 / 1e-3, "N s/m"),
+        ("about x", (0, 0), 0.3 * 500.0 / 1e-3, "N m s"),
+        ("about y", (0, 1), 0.3 * 450.0 / 1e-3, "N m s"),
+        ("about z", (0, 0), 0.3 * 1000.0 / 1e-3, "N m s"),
+        ("about axle", (1, 1), 0.3 * 450.0 / 1e-3, "N m s"),
+    ],
+)  # fmt: skip
+def test_a_commanded_damper_that_takes_three_tenths_of_a_velocity_in_a_step_is_told(
+    about, body, most, unit
+):
+    """A step h of 1 ms takes h c/m of it."""
+    actions = {"x": 0, "y": 1, "about x": ABOUT, "about y": ABOUT + 1, "about z": ABOUT + 2,
+               "about axle": ABOUT + 3}  # fmt: skip
+    which = np.zeros((2, 10), dtype=np.int64)
+    which[0, MODE] = BY_FORCE
+    which[1, [ACTION, MODE, COMMAND]] = actions[about], BY_DAMPER, 3
+    inertia = np.array([[500.0, 900.0, 1000.0], [250.0, 450.0, 500.0]])
+    system = Record(
+        actuators=Record(which=which, body=np.array([(0, 0), body])),
+        bodies=Record(mass=np.array([2000.0, 1000.0]), inertia=inertia),
+    )
+    for times, said in ((0.99, False), (1.01, True)):
+        memory = np.full(8, 1e12)
+        memory[3 + LARGEST] = times * most
+        found = commanded_dampers(system, ("one", "two"), memory, 1e-3)
+        assert bool(found) == said
+        if said:
+            assert f"The damper two was commanded up to {times * most:.3g} {unit}" in found
+
+
+@pytest.mark.parametrize(
+    ("elastic", "massless", "words"),
+    [(False, False, "the track is rigid"), (True, True, "the track has no masses"),
+     (True, False, "")],
+)  # fmt: skip
+def test_wheels_that_are_not_round_need_rails_with_mass(elastic, massless, words):
+    found = uneven_wheels_on(Record(elastic=elastic, massless=massless))
+    assert words in found
+    assert bool(found) == bool(words)
+
+
+def test_counts_are_told_in_the_singular_and_in_parts_of_all():
+    assert "In 1 evaluation a wheel was yawed" in yaw_range(1)
+    assert "In 2 evaluations a wheel was yawed" in yaw_range(2)
+    assert yaw_range(0) == ""
+    assert "3 of 200 contact patches in the time loop (1.5e-02)" in creep_range(3, 200)
+    assert "within the 3 s after" in evaluated_whole(3.0, 2.9)
+    assert evaluated_whole(3.0, 3.1) == evaluated_whole(0.0, 0.0) == ""
+    for left, speed, said in ((0.11, 10.0, True), (0.09, 10.0, False), (5.0, 9.0, False)):
+        assert bool(ended_by_the_track(left, 0.95, speed)) == said
