@@ -12,7 +12,7 @@ ROWS = slice(0, 500), slice(300, 800), slice(310, 700), slice(0, 400), slice(900
 @pytest.fixture(scope="module")
 def run() -> railsim.Result:
     coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
-    return railsim.simulate(coach, track, speed=20.0, start=80.0, duration=5.0)
+    return railsim.simulate(coach, track, speed=20.0, start=285.0, duration=5.0)
 
 
 def test_parts_are_the_same_to_the_last_bit(run: railsim.Result) -> None:
@@ -21,6 +21,17 @@ def test_parts_are_the_same_to_the_last_bit(run: railsim.Result) -> None:
         alone = Record(run, "run", coarse=True).readings(rows)
         for one, other in zip(shared.readings(rows), alone, strict=True):
             assert one.tobytes() == other.tobytes(), rows
+
+
+def test_roll_that_is_read_adds_up_to_the_way_the_car_body_leans(run: railsim.Result) -> None:
+    """Over time: cant angle and roll in the track frame, on the cant ramp before a curve."""
+    record = Record(run, "run", coarse=True)
+    roll = record.readings(slice(0, record.rows))[1][:, list(record.sensors).index("floor_middle")]
+    lean = run["body_position"][: record.rows, run.bodies.index("carbody"), 3]
+    lean = lean + record.alignment.cant_angle(record.distance[: record.rows])
+    leaned = float(np.trapezoid(roll, record.time[: record.rows]))
+    assert abs(lean[-1] - lean[0]) > 0.01
+    assert leaned == pytest.approx(lean[-1] - lean[0], rel=2e-3)
 
 
 def test_readings_of_another_speed_are_read_again() -> None:
