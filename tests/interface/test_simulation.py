@@ -8,6 +8,7 @@ import pytest
 import railsim
 from railsim.errors import InputError
 from railsim.simulation import advance, stepping
+from railsim.simulation.conditions import own_speed
 
 STEP = 1.0 / 600.0
 ACTUATOR = {
@@ -381,3 +382,13 @@ def assert_counted(facts):
     assert facts["real_time_factor"] * facts["cpu_time"] == pytest.approx(0.3, rel=1e-9)
     assert 0.0 < facts["cpu_time"] <= facts["wall_time"]
     assert facts["steps"] * facts["step"] == pytest.approx(0.3, rel=1e-9)
+
+
+def test_a_run_that_goes_on_takes_speed_and_place_of_its_state():
+    """They may be given too, if they are the same."""
+    state = np.array([0.1, 0.2, 340.0, 20.0])  # ..., place, speed
+    for given in ((None, 0.0), (20.0, 340.0), ("72 km/h", 0.0), (None, 340.0)):
+        assert own_speed(state, *given) == (20.0, 340.0)
+    for given, word in (((20.1, 0.0), "speed"), ((None, 340.1), "start"), ((0.0, 340.0), "speed")):
+        with pytest.raises(InputError, match=f"{word}: given together with `resume`"):
+            own_speed(state, *given)
