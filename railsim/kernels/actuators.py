@@ -20,9 +20,9 @@ the limit of its rate are an internal state (see `internal`).
 from math import isfinite, sqrt
 
 from railsim.kernels import compiled
-from railsim.kernels.driving import BRAKES_FULLY
+from railsim.kernels.driving import braking_share
 from railsim.kernels.own_laws import call_at
-from railsim.kernels.state import TIME, internal_begin
+from railsim.kernels.state import SPEED, TIME, internal_begin
 from railsim.kernels.system import ANGULAR, FORCE, MOMENT, POSITION, RADIUS, VELOCITY
 from railsim.kernels.vectors import (
     add_at,
@@ -182,7 +182,7 @@ def actuator_force(system, work, state, i, x, rate):
         force = acts.row[i, STIFFNESS] * (x - command) + acts.row[i, DAMPING] * rate
     elif mode == BY_BRAKE:
         rim = rate * system.bodies.row[acts.body[i, 1], RADIUS]
-        force = max(0.0, command) * min(1.0, max(-1.0, rim / BRAKES_FULLY))
+        force = max(0.0, command) * braking_share(rim, state[SPEED])
     else:
         force = own_force(system, work, state, i, x, rate, command)
     return limited_force(acts, i, force, x, rate)

@@ -21,6 +21,8 @@ from railsim.kernels.track_frame import OMEGA, OMEGA_S
 
 # speed of the wheel's circumference below which a brake's torque decreases linearly to 0 (m/s)
 BRAKES_FULLY = 0.1
+# that speed over the vehicle's, at most: no wheel that rolls loses its brake before the standstill
+OF_ROLLING = 0.5
 
 
 @compiled(python=False)
@@ -51,6 +53,12 @@ def add_traction(system, work, speed):
 
 
 @compiled(python=False)
+def braking_share(rim, speed):
+    """Share of a brake's torque against a tread that turns with `rim` [m/s], in its sense."""
+    return min(1.0, max(-1.0, rim / min(BRAKES_FULLY, OF_ROLLING * speed)))
+
+
+@compiled(python=False)
 def axle_torque(drives, e, frame_offset, bodies, state):
     """Torque of one drive or brake on its wheelset, forwards positive [N m]."""
     time, s, speed = state[TIME], state[ARC_LENGTH], state[SPEED]
@@ -65,7 +73,7 @@ def axle_torque(drives, e, frame_offset, bodies, state):
     # forwards it turns about the negative y axis
     rolling = -state[velocity_begin(bodies.kind.shape[0]) + 6 * w + 4] * bodies.row[w, RADIUS]
     if drives.row[e, BRAKES] > 0.0:
-        torque *= -min(1.0, max(-1.0, rolling / BRAKES_FULLY))
+        torque *= -braking_share(rolling, speed)
     if drives.row[e, SLIP_END] > 0.0:
         begin, gone = drives.row[e, SLIP_BEGIN], drives.row[e, SLIP_END]
         slip = (rolling - speed) / speed if torque > 0.0 else (speed - rolling) / speed

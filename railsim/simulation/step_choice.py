@@ -25,7 +25,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import ModelError, input_error
 from railsim.kernels.actuators import BY_BRAKE, LIMIT, MODE
 from railsim.kernels.check_rails import DAMPING, STIFFNESS
-from railsim.kernels.driving import BRAKES_FULLY
+from railsim.kernels.driving import BRAKES_FULLY, OF_ROLLING
 from railsim.kernels.element_columns import LINK_COLUMNS
 from railsim.kernels.rhs import STANDSTILL_SPEED
 from railsim.kernels.system import BRAKES, RADIUS, System
@@ -88,9 +88,9 @@ class StepChoice:
         self._classes: dict[str, Stability] = {}
         self._states = states
         lightest = model.system.bodies.mass[model.system.contact.body].min()
-        guided = check_rail_step(model.check.check, float(lightest))
+        self._guided = check_rail_step(model.check.check, float(lightest))
         self._wave = shortest_wave(track)
-        self._followed = min(braked_step(model.system), guided)
+        self._braked = braked_step(model.system)
         self.varies = settings.drive.mode != "constant"
         self.smallest = math.inf
 
@@ -105,7 +105,8 @@ class StepChoice:
         if self._settings.step is None:
             elastic = bool(self._model.system.support.elastic)
             waves = self._model.wheels.longest_step(speed, self._wave, elastic=elastic)
-            longest = min(longest, waves, self._followed)
+            braked = self._braked * min(1.0, OF_ROLLING * speed / BRAKES_FULLY)
+            longest = min(longest, waves, braked, self._guided)
         longest = min(longest, *self._periods, longest)
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
         for finer in range(every, 2 * every + 1) if self._periods else ():

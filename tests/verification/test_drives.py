@@ -12,7 +12,9 @@ import pytest
 import railsim
 from railsim.definitions.loading import load_track
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.definitions.track.elements import ConstantGradient
 from railsim.definitions.vehicle.definition import Vehicle
+from railsim.kernels.rhs import STANDSTILL_SPEED
 
 RADIUS, HEIGHT, HALF_BASE, HALF_WIDTH, KZ = 0.46, 0.9, 1.25, 1.0, 8e5
 MASS, TORQUE = 20e3, 3e3
@@ -184,6 +186,32 @@ def test_a_brake_holds_a_locked_wheelset_and_does_not_turn_it_back():
     assert np.all((rim > -1e-3) & (rim < 0.1))
     assert on_wheels(result)[-1] == pytest.approx(-0.1 * np.sum(result["Q"][-1], axis=1), rel=0.02)
     assert result["axle_torque"][-1] == pytest.approx(on_wheels(result)[-1] * RADIUS, rel=0.01)
+
+
+@pytest.mark.parametrize("drive", [{"kind": "brake"}, {"kind": "actuator", "command": "brake"}])
+def test_brakes_stop_on_a_falling_gradient(drive):
+    """Of 1.5 times the weight's force down the gradient, half a one slows the mass down to the end.
+
+    A brake that faded before the standstill would let it roll on: t = (M + sum I/r^2) dV/(F/2).
+    """
+    mass = MASS + 2.0 * WHEELSET["mass"]
+    down = mass * 9.81 * 0.1 / np.hypot(1.0, 0.1)
+    torque = 1.5 * down * RADIUS / 2.0
+    commanded = drive["kind"] == "actuator"
+    law = {"acts": "axle"} if commanded else {"torque_table": [[0.0, torque]]}
+    vehicle = bogie({"bodies": ["frame", "wheelset"], **drive, **law})
+    fall = ConstantGradient(type="CST", length=500.0, gradient=-0.1)
+    settings = railsim.Settings(drive={"mode": "free"}, step=2e-4)
+    track = load_track("straight").replace(vertical=(fall,))
+    with railsim.Simulation(vehicle, track, speed=0.5, duration=3.0, settings=settings) as sim:
+        for name in sim.actuators:
+            sim.set(name, torque)
+        sim.run()
+        result = sim.result()
+    assert "came to a standstill" in result.attributes["status_reason"]
+    rotating = mass + 2.0 * WHEELSET["inertia"][1] / RADIUS**2
+    expected = (0.5 - STANDSTILL_SPEED) * rotating / (0.5 * down)
+    assert result.time[-1] == pytest.approx(expected, rel=0.01)
 
 
 # of the coach's bodies in the order of the results: mass, height, place from the middle [kg, m]
