@@ -359,7 +359,7 @@ def test_steered_wheelsets_are_radial_at_a_gain_of_one(example):
 @pytest.mark.parametrize(
     ("change", "found"),
     [
-        ({"bodies": ["wheelset", "frame"]}, "first the body that takes the reaction"),
+        ({"bodies": ["wheelset", "frame"]}, "first the body or axlebox that takes the reaction"),
         ({"point": [0.0, 0.0, 0.0]}, "acts at no point"),
         ({"sides": "both"}, "no 'sides' and no 'stroke'"),
         ({"stroke": 0.1}, "no 'sides' and no 'stroke'"),

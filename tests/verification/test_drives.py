@@ -18,6 +18,7 @@ from railsim.kernels.rhs import STANDSTILL_SPEED
 
 RADIUS, HEIGHT, HALF_BASE, HALF_WIDTH, KZ = 0.46, 0.9, 1.25, 1.0, 8e5
 MASS, TORQUE = 20e3, 3e3
+SIDES = "left", "right"
 WHEELSET = {
     "mass": 1500.0,
     "inertia": [800.0, 100.0, 800.0],
@@ -314,6 +315,35 @@ def test_nose_suspended_motor_carries_its_reaction():
     assert on_wheels(result)[-1] == pytest.approx(TORQUE / RADIUS, rel=2e-3)
 
 
+def test_axleboxes_with_arms_carry_the_reaction():
+    """Callipers on the arms: the torque of each is a force of the bush of its arm over the lever.
+
+    Spring above the axle, bush at its height: no other force has a moment about the axle.
+    """
+    lever = 0.5
+    arm = {"wheelset": "wheelset", "position": [0.0, HALF_WIDTH, -RADIUS], "sides": "both"}
+    between = {"kind": "bushing", "bodies": ["frame", "arm"], "sides": "both"}
+    spring = {"stiffness": [0.0, 0.0, KZ], "damping": [0.0, 0.0, 3e4]}
+    bush = {"stiffness": [1e7, 5e6, 1e7], "damping": [2e4, 2e4, 2e4]}
+    vehicle = bogie(None).model_dump(exclude_none=True)
+    vehicle["assemblies"]["axle"] |= {
+        "axleboxes": {"arm": {**arm, "pitch_inertia": 10.0}},
+        "elements": {
+            "primary": {**between, **spring, "point": [0.0, HALF_WIDTH, -RADIUS]},
+            "bush": {**between, **bush, "point": [-lever, HALF_WIDTH, -RADIUS]},
+            "brake_left": traction(kind="brake", bodies=["arm.left", "wheelset"]),
+            "brake_right": traction(kind="brake", bodies=["arm.right", "wheelset"]),
+        },
+    }
+    result = run(Vehicle.model_validate(vehicle))
+    names = list(result.coordinates["element"])
+    at = [[names.index(f"{p}.bush.{side}") for side in SIDES] for p in ("front", "rear")]
+    change = np.diff(result["element_force"][[0, -1]][:, at, 2], axis=0)[0]
+    # the wheel turns its calliper forwards: in front the bush, behind its axle, is lifted
+    np.testing.assert_allclose(change, np.outer([-1.0, 1.0], [TORQUE / lever] * 2), rtol=0.01)
+    assert on_wheels(result)[-1] == pytest.approx(-2.0 * TORQUE / RADIUS, rel=1e-3)
+
+
 def test_mirror_image():
     """The left-hand curve with the mirrored vehicle: the mirrored forces to round-off."""
     vehicle, track = bogie(traction()), load_track("curve_r500")
@@ -325,7 +355,7 @@ def test_mirror_image():
 @pytest.mark.parametrize(
     ("change", "found"),
     [
-        ({"bodies": ["wheelset", "frame"]}, "the body that takes the reaction"),
+        ({"bodies": ["wheelset", "frame"]}, "the body or axlebox that takes the reaction"),
         ({"slip_control": [0.03, 0.01]}, "two rising slips"),
         ({"slip_control": [1.0, 3.0]}, "up to 1, such as"),  # per cent
         ({"over": "distance", "demand_table": None}, "'over' needs 'demand_table'"),

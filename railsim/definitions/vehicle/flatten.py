@@ -292,7 +292,7 @@ def _torque_faults(group: Group, frame: _Frame, kinds: Mapping[str, str]) -> Ite
         if not isinstance(element, AxleTorque) and getattr(element, "acts", "") != "axle":
             continue
         found = [kinds[resolve(body, frame.scope, None, kinds) or ""] for body in element.bodies]
-        if found != ["body", "wheelset"]:
+        if found[0] == "wheelset" or found[1] != "wheelset":
             key = frame.key("elements", name, "bodies")
-            allowed = "first the body that takes the reaction, then the wheelset"
+            allowed = "first the body or axlebox that takes the reaction, then the wheelset"
             yield Fault("", key, " and ".join(f"'{kind}'" for kind in found), allowed)
