@@ -283,8 +283,8 @@ def braked_step(system: System) -> float:
     torque = np.zeros(len(bodies.kind))
     for e in np.flatnonzero(drives.row[:, BRAKES] > 0.0):
         first, demand, end = drives.start[2 * e : 2 * e + 3]
-        factors = np.abs(drives.table[demand:end, 1])
-        most = np.abs(drives.table[first:demand, 1]).max()
+        factors = drives.table[demand:end, 1]
+        most = drives.table[first:demand, 1].max()
         torque[drives.body[e, 1]] += most * (factors.max() if end > demand else 1.0)
     acts, contact = system.actuators, system.contact
     for i in np.flatnonzero(acts.which[:, MODE] == BY_BRAKE):

@@ -201,7 +201,7 @@ def test_a_damper_commanded_beyond_the_step_is_remarked_upon(share, said):
         ({"front": [{}], "rear": [{"torque_table": [[0.0, 50e3]]}]}, {}, 50e3),
         ({"front": [{}, {"torque_table": [[0.0, 6e3]]}], "rear": [{}]}, {}, 26e3),
         ({"rear": [{"torque_table": [[0.0, 20e3], [9.0, 30e3], [20.0, 8e3]]}]}, {}, 30e3),
-        ({"rear": [{}, {"demand_table": [[0.0, 0.2], [1.0, -0.7], [2.0, 0.0]]}]}, {}, 34e3),
+        ({"rear": [{}, {"demand_table": [[0.0, 0.2], [1.0, 0.7], [2.0, 0.0]]}]}, {}, 34e3),
         ({"front": [{"kind": "traction"}]}, {}, None),  # no brake
         ({}, {"force_limit": 8e3}, 8e3),
         ({"front": [{}]}, {"force_limit": 8e3}, 28e3),

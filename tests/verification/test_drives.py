@@ -361,6 +361,7 @@ def test_mirror_image():
         ({"over": "distance", "demand_table": None}, "'over' needs 'demand_table'"),
         ({"torque_table": [[5.0, 1.0], [0.0, 1.0]]}, "must increase"),
         ({"kind": "brake", "torque_table": [[0.0, -1.0]]}, "greater than or equal to 0"),
+        ({"kind": "brake", "demand_table": [[0.0, 1.0], [2.0, -0.5]]}, "must not be negative"),
     ],
 )
 def test_faults_are_named(change, found):

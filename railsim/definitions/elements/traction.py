@@ -30,6 +30,8 @@ class AxleTorque(PairElement):
     def _tables_mean_something(self) -> None:
         if self.over == "distance" and self.demand_table is None:
             raise ValueError("'over' needs 'demand_table'")
+        if self.BRAKES and any(factor < 0.0 for _, factor in self.demand_table or ()):
+            raise ValueError("factors of a brake's 'demand_table' must not be negative")
         if self.slip_control is not None and not self.slip_control[0] < self.slip_control[1] <= 1.0:
             raise ValueError("'slip_control' needs two rising slips up to 1, such as [0.01, 0.02]")
 
