@@ -1,5 +1,6 @@
 """Settings files, `railsim-settings/1`: how a run is computed and what it outputs."""
 
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field
@@ -56,6 +57,9 @@ class InitialState(base.Definition):
     """Angular velocity about z [rad/s]"""
 
 
+STEEPEST = 5.0  # acceleration along the track, on dry rails and with track brakes [m/s2]
+
+
 class Drive(base.Definition):
     """Speed profile along the track."""
 
@@ -75,6 +79,22 @@ class Drive(base.Definition):
             raise ValueError("'speed_table' belongs to mode = \"table\" and only to it")
         if self.mode != "free" and (self.traction_table or any(self.resistance)):
             raise ValueError("'traction_table' and 'resistance' belong to mode = \"free\"")
+
+    def unusual(self) -> list[base.Remark]:
+        """Return the steepest pair of rows, a = V dV/ds, that wheels and brakes do not follow."""
+        steep = [
+            (max(v, w) * abs(w - v) / (t - s), s, t)
+            for (s, v), (t, w) in pairwise(self.speed_table or ())
+        ]
+        return [
+            base.Remark(
+                "drive.speed_table",
+                f"asks for {rate:.3g} m/s2 between {s:.12g} and {t:.12g} m; wheels and brakes give "
+                f"{STEEPEST:g} m/s2 at most",
+            )
+            for rate, s, t in sorted(steep)[-1:]
+            if rate > STEEPEST
+        ]
 
 
 # Smallest output rate over the filter's frequency: room for the transition (zero); 1/1000 of what
@@ -185,7 +205,7 @@ class Settings(FileDefinition):
 
     def unusual(self) -> list[base.Remark]:
         """Return values beside which another takes their place."""
-        fields, found = type(self).model_fields, []
+        fields, found = type(self).model_fields, self.drive.unusual()
         if self.output_spacing is not None and self.output_rate != fields["output_rate"].default:
             found.append(
                 base.Remark("output_rate", "has no effect: output_spacing takes its place")

@@ -56,6 +56,22 @@ def test_speed_table_is_met(bogie, straight):
     assert np.max(np.abs(speeds(result) - expected)[smooth]) < 1e-4
 
 
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (RAMP, "asks for 6 m/s2 between 50 and 150 m"),  # 30 m/s of 0.2 m/s per m
+        (((0.0, 10.0), (100.0, 10.0), (100.01, 20.0)), "asks for 2e+04 m/s2 between 100 and"),
+        (((0.0, 20.0), (40.0, 10.0)), None),  # 5 m/s2
+        (((0.0, 20.0),), None),
+    ],
+)
+def test_steps_of_the_speed_are_remarked_on(rows, said):
+    """A step within one step of the run has no force at all, whatever the bodies weigh."""
+    found = in_table(rows).unusual()
+    assert [remark.key for remark in found] == ["drive.speed_table"] * (said is not None)
+    assert said is None or said in found[0].text
+
+
 def test_ramp_pushes_the_bogie_with_mass_times_acceleration(bogie, straight):
     """Held reference: the wheelsets' rolling needs I/r0 V' at the rails, and nothing sways."""
     result = simulate(bogie, straight, settings=in_table(), until=140.0)
