@@ -73,7 +73,9 @@ def axle_torque(drives, e, frame_offset, bodies, state):
     # forwards it turns about the negative y axis
     rolling = -state[velocity_begin(bodies.kind.shape[0]) + 6 * w + 4] * bodies.row[w, RADIUS]
     if drives.row[e, BRAKES] > 0.0:
-        torque *= -braking_share(rolling, speed)
+        torque = -torque
+    if torque < 0.0:
+        torque *= braking_share(rolling, speed)
     if drives.row[e, SLIP_END] > 0.0:
         begin, gone = drives.row[e, SLIP_BEGIN], drives.row[e, SLIP_END]
         slip = (rolling - speed) / speed if torque > 0.0 else (speed - rolling) / speed

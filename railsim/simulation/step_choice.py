@@ -28,7 +28,7 @@ from railsim.kernels.check_rails import DAMPING, STIFFNESS
 from railsim.kernels.driving import BRAKES_FULLY, OF_ROLLING
 from railsim.kernels.element_columns import LINK_COLUMNS
 from railsim.kernels.rhs import STANDSTILL_SPEED
-from railsim.kernels.system import BRAKES, RADIUS, System
+from railsim.kernels.system import BRAKES, RADIUS, SLIP_BEGIN, SLIP_END, Bodies, Drives, System
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
 from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
@@ -44,7 +44,7 @@ CLASS = 1.2  # ratio of the speeds of a class
 # part of the output interval by which a given step may miss an integer fraction: six digits
 WRITTEN = 1e-5
 FRICTION_CLASS = 0.1  # difference of the coefficients of friction of a class
-HELD, DRY = 1.6, 0.5  # z in `braked_step`; friction of dry rails
+HELD, DRY = 1.6, 0.5  # z in `braked_step` and `slip_control_step`; friction of dry rails
 GUIDED = 0.4, 0.6  # h c/m and h sqrt(k/m) in `check_rail_step`
 MOST_JUDGED = 10_000
 ALIGNMENT = {"name", "source", "speed", "plan", "cant", "rounding"}  # of a track
@@ -91,6 +91,7 @@ class StepChoice:
         self._guided = check_rail_step(model.check.check, float(lightest))
         self._wave = shortest_wave(track)
         self._braked = braked_step(model.system)
+        self._slipping = slip_control_step(model.system)
         self.varies = settings.drive.mode != "constant"
         self.smallest = math.inf
 
@@ -106,7 +107,7 @@ class StepChoice:
             elastic = bool(self._model.system.support.elastic)
             waves = self._model.wheels.longest_step(speed, self._wave, elastic=elastic)
             braked = self._braked * min(1.0, OF_ROLLING * speed / BRAKES_FULLY)
-            longest = min(longest, waves, braked, self._guided)
+            longest = min(longest, waves, self._guided, braked, self._slipping * speed)
         longest = min(longest, *self._periods, longest)
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
         for finer in range(every, 2 * every + 1) if self._periods else ():
@@ -281,19 +282,42 @@ def braked_step(system: System) -> float:
     """
     drives, bodies = system.drives, system.bodies
     torque = np.zeros(len(bodies.kind))
-    for e in np.flatnonzero(drives.row[:, BRAKES] > 0.0):
-        first, demand, end = drives.start[2 * e : 2 * e + 3]
-        factors = drives.table[demand:end, 1]
-        most = drives.table[first:demand, 1].max()
-        torque[drives.body[e, 1]] += most * (factors.max() if end > demand else 1.0)
+    for e, w in enumerate(drives.body[:, 1]):
+        torque[w] += max(0.0, -_torques(drives, e).min())
     acts, contact = system.actuators, system.contact
     for i in np.flatnonzero(acts.which[:, MODE] == BY_BRAKE):
         w = acts.body[i, 1]
         dry = DRY * 2.0 * contact.load[contact.body == w].sum() * bodies.row[w, RADIUS]
         torque[w] += min(acts.row[i, LIMIT], dry)
-    braked = np.flatnonzero(torque)
-    rate = torque[braked] * bodies.row[braked, RADIUS] / bodies.inertia[braked, 1] / BRAKES_FULLY
-    return HELD / float(rate.max()) if len(braked) else math.inf
+    return _held_step(bodies, torque / BRAKES_FULLY)
+
+
+def slip_control_step(system: System) -> float:
+    """Longest step with which slip control holds its slip, over the vehicle's speed V [s2/m].
+
+    A torque M that falls to 0 over the slips from a to b damps the spin by c = M r/((b - a) V).
+    """
+    drives = system.drives
+    slope = np.zeros(len(system.bodies.kind))
+    for e in map(int, np.flatnonzero(drives.row[:, SLIP_END] > 0.0)):
+        band = drives.row[e, SLIP_END] - drives.row[e, SLIP_BEGIN]
+        slope[drives.body[e, 1]] += np.abs(_torques(drives, e)).max() / band
+    return _held_step(system.bodies, slope)
+
+
+def _torques(drives: Drives, e: int) -> Floats:
+    """Torques of a drive, those of its table times the factors of its demand, forwards positive."""
+    first, demand, end = drives.start[2 * e : 2 * e + 3]
+    factors = drives.table[demand:end, 1] if end > demand else np.ones(1)
+    torque: Floats = np.outer(drives.table[first:demand, 1], factors)
+    return -torque if drives.row[e, BRAKES] > 0.0 else torque
+
+
+def _held_step(bodies: Bodies, slope: Floats) -> float:
+    """Longest step with torques that fall by `slope` over the tread's speed [N m/(m/s)]."""
+    held = np.flatnonzero(slope)
+    rate = slope[held] * bodies.row[held, RADIUS] / bodies.inertia[held, 1]
+    return HELD / float(rate.max()) if len(held) else math.inf
 
 
 def with_steepest_dampers(system: System) -> System:

@@ -18,7 +18,7 @@ from railsim.definitions.mirror import mirrored_vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.kernels.actuators import COMMAND, SENSE
 from railsim.model.assembly import assemble
-from railsim.simulation.step_choice import braked_step
+from railsim.simulation.step_choice import braked_step, slip_control_step
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 G = 9.80665
@@ -203,6 +203,7 @@ def test_a_damper_commanded_beyond_the_step_is_remarked_upon(share, said):
         ({"rear": [{"torque_table": [[0.0, 20e3], [9.0, 30e3], [20.0, 8e3]]}]}, {}, 30e3),
         ({"rear": [{}, {"demand_table": [[0.0, 0.2], [1.0, 0.7], [2.0, 0.0]]}]}, {}, 34e3),
         ({"front": [{"kind": "traction"}]}, {}, None),  # no brake
+        ({"front": [{"kind": "traction", "torque_table": [[0.0, 40e3], [9.0, -30e3]]}]}, {}, 30e3),
         ({}, {"force_limit": 8e3}, 8e3),
         ({"front": [{}]}, {"force_limit": 8e3}, 28e3),
         ({}, {}, 0.5 * LOADED / 2.0 * GRAVITY * RADIUS),  # slides on dry rails
@@ -226,6 +227,19 @@ def test_longest_step_holds_the_axle_that_is_braked_most(brakes, actuator, torqu
     wheelset = WHEELSET["inertia"][1]
     step = np.inf if torque is None else 1.6 * wheelset * 0.1 / (torque * RADIUS)
     assert braked_step(system) == pytest.approx(step, rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["brake", "traction"])
+def test_longest_step_holds_the_slip_of_a_controlled_axle(kind):
+    """z = h c/I = 1.6 with c = M r/((b - a) V) of a torque that is gone over the slips a to b."""
+    law = {"demand_table": [[0.0, 0.0], [1.0, 0.8]], "slip_control": [0.01, 0.03]}
+    system = assemble(
+        bogie(traction(kind=kind, torque_table=[[0.0, 25e3], [9.0, 5e3]], **law)),
+        load_track("straight"),
+        railsim.Settings(),
+    ).system
+    step = 1.6 * WHEELSET["inertia"][1] * 0.02 / (20e3 * RADIUS)
+    assert slip_control_step(system) == pytest.approx(step, rel=1e-9)
 
 
 def test_a_brake_by_a_damper_decays():

@@ -179,9 +179,30 @@ def test_slip_control_holds_the_creepage_near_the_optimum_on_low_friction():
     assert np.min(np.abs(spinning["xi_x"][-1])) > 0.3
 
 
-def test_a_brake_holds_a_locked_wheelset_and_does_not_turn_it_back():
+def test_slip_control_holds_the_creepage_at_walking_speed():
+    """The torque falls over 0.02 V: the step follows, and the bogie slows down by mu g.
+
+    With steps too long for that its wheels alternated, and it slowed down by 1.4 mu g.
+    """
+    law = traction(kind="brake", torque_table=[[0.0, 20e3]], slip_control=[0.01, 0.03])
+    result = run(bogie(law), friction=0.1, speed=2.0, duration=1.0, drive={"mode": "free"})
+    late = result["time"] > 0.5
+    creepage = result["xi_x"][late]
+    assert np.all((creepage > 0.01) & (creepage < 0.03))
+    rate = np.polyfit(result["time"][late], np.gradient(result["distance"], 0.005)[late], 1)[0]
+    assert rate == pytest.approx(-0.1 * 9.81, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "braking",
+    [
+        {"kind": "brake", "torque_table": [[0.0, 20e3]]},
+        {"kind": "traction", "torque_table": [[0.0, -20e3]]},
+    ],
+)
+def test_a_brake_holds_a_locked_wheelset_and_does_not_turn_it_back(braking):
     """On low friction the wheels stop turning; the torque fades to what the rails give."""
-    result = run(bogie(traction(kind="brake", torque_table=[[0.0, 20e3]])), friction=0.1)
+    result = run(bogie(traction(**braking)), friction=0.1)
     spin = result["body_velocity"][-1, 1:, 4]  # less than that of rolling, -V/r
     rim = (10.0 / RADIUS - spin) * RADIUS
     assert np.all((rim > -1e-3) & (rim < 0.1))
