@@ -4,12 +4,14 @@ A right-hand curve becomes the left-hand one, a lopsided load changes sides.  Mi
 mirrored track gives the mirrored result, which checks all signs.
 """
 
+from collections.abc import Set
 from typing import Any, TypeVar
 
 from railsim.definitions.base import OTHER_SIDE, Definition, Vector
 from railsim.definitions.elements.base import Element
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import groups
 
 SIGNS = (1.0, -1.0, 1.0)
 TABLES = ("bodies", "wheelsets", "axleboxes", "elements", "assemblies", "loads", "sensors")
@@ -49,10 +51,16 @@ def mirrored_vehicle(vehicle: Vehicle) -> Vehicle:
 
     Its load cases and sensors are mirrored too; signals and what controllers do with them are not.
     """
-    return _mirrored(vehicle)
+    boxes = {
+        name
+        for group in groups(vehicle)
+        for name, box in group.axleboxes.items()
+        if box.sides == "both"
+    }
+    return _mirrored(vehicle, boxes)
 
 
-def _mirrored(part: Part) -> Part:
+def _mirrored(part: Part, boxes: Set[str]) -> Part:
     """Return a part of a vehicle, with all parts in it, on the other side."""
     if getattr(part, "sides", None) == "both":
         return part
@@ -67,12 +75,20 @@ def _mirrored(part: Part) -> Part:
                 update[name] = value[::-1]
             case ("wheel", _):
                 update[name] = OTHER_SIDE[value]
+            case ("bodies", tuple()):
+                update[name] = tuple(_opposite(body, boxes) for body in value)
             case ("placements", _):
-                update[name] = tuple(map(_mirrored, value))
+                update[name] = tuple(_mirrored(inner, boxes) for inner in value)
             case (_, dict()) if name in (*TABLES, "out_of_round"):
-                update[name] = {key: _mirrored(inner) for key, inner in value.items()}
+                update[name] = {key: _mirrored(inner, boxes) for key, inner in value.items()}
     turned = part.mirrored(SIGNS) if isinstance(part, Element) else part
     return turned.model_copy(update=update)
+
+
+def _opposite(body: str, boxes: Set[str]) -> str:
+    """Return the name of the body on the other side of an axlebox on both sides."""
+    box, _, side = body.rpartition(".")
+    return f"{box}.{OTHER_SIDE[side]}" if box.rpartition(".")[2] in boxes else body
 
 
 def _across(point: Vector) -> Vector:

@@ -76,6 +76,21 @@ def test_symmetric_vehicle_is_its_own_mirror_image():
     assert flatten(mirrored_vehicle(coach)) == flatten(coach)
 
 
+def test_an_element_on_one_of_two_axleboxes_changes_sides():
+    coach = load_vehicle("coach_flexicoil").model_dump(exclude_none=True)
+    brake = {"kind": "brake", "bodies": ["arm.left", "wheelset"], "torque_table": [[0.0, 5e3]]}
+    coach["assemblies"]["bogie"]["assemblies"]["axle"]["elements"]["brake"] = brake
+    vehicle = Vehicle.model_validate(coach)
+    image = mirrored_vehicle(vehicle)
+    assert mirrored_vehicle(image) == vehicle
+    here, there = (
+        [e.body1 for e in flatten(v).elements if e.name.endswith(".brake")]
+        for v in (vehicle, image)
+    )
+    assert [name.replace(".left", ".right") for name in here] == there
+    assert len(here) == 4
+
+
 def test_lopsided_vehicle_changes_sides():
     wheelset = {
         "mass": 1000.0,
