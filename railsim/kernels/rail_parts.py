@@ -111,15 +111,20 @@ def zone_at(rails, part, i, k, zone):
 
 
 @compiled(python=False)
-def fall_at(rails, part, zone, s, otherwise, cell):
-    """Slope of a zone's gap at another position, at the nearest node in y and roll [1]."""
+def fall_at(rails, part, zone, s, otherwise, cell, weights):
+    """Slope of a zone's gap at another position, at the nearest node in y and roll [1].
+
+    The node behind is nearer where it weighs more.  A wheelset in the middle is on a node: were it
+    that of its cell, round-off would decide which.
+    """
     i = cell_of(rails, part, s)
     if i < 0:
         return otherwise
     here, there = rails.node_zone[i, zone], rails.node_zone[i + 1, zone]
     if here < 0 or there < 0:
         return otherwise
-    iy, ir, iw = cell[0], cell[1], cell[2]
+    iy = cell[0] + int(weights[2] > weights[1])
+    ir, iw = cell[1] + int(weights[10] > weights[9]), cell[2]
     step = gap_at(rails, there, iw, ir, iy) - gap_at(rails, here, iw, ir, iy)
     return step / (rails.node_s[i + 1] - rails.node_s[i])
 
@@ -321,5 +326,7 @@ def look_up_part(system, work, cell, place, part, first):
         bump[patch, B_RATE] -= fall * rate
         later = s + rate * work.watch[AHEAD]
         if later > s:
-            bump[patch, B_CHANGE] += rate * (fall - fall_at(rails, part, zone, later, fall, cell))
+            bump[patch, B_CHANGE] += rate * (
+                fall - fall_at(rails, part, zone, later, fall, cell, weights)
+            )
     return nearest
