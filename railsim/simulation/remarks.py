@@ -99,7 +99,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             model.system, model.index.actuators, run.work.memory, prepared.steps.smallest
         ),
         creep_range(int(run.events[1]), int(run.events[0])),
-        yaw_range(int(run.events[2])),
+        yaw_range(int(run.events[2]), float(np.sqrt(model.rails.arrays.w[-1]))),
         unsettled_rails(int(run.work.parts[UNSETTLED])),
         uneven_wheels_on(support) if uneven else "",
     ]
@@ -233,14 +233,18 @@ def creep_range(outside: int, patches: int) -> str:
     )
 
 
-def yaw_range(look_ups: int) -> str:
-    """Remark on wheels that were yawed against their rails beyond the contact table."""
+def yaw_range(look_ups: int, of_sections: float) -> str:
+    """Remark on wheels that were yawed against their rails beyond the contact table.
+
+    `of_sections`: where that of rails with sections ends [rad], zero without any.
+    """
     if look_ups == 0:
         return ""
+    within = f" ({1e3 * of_sections:.3g} mrad within track.sections)" if of_sections else ""
     return (
         f"In {_evaluations(look_ups)} a wheel was yawed against its rail by more than "
-        f"{1e3 * YAW_MAX:g} mrad, where the contact table ends: it was continued linearly in the "
-        "square of the yaw."
+        f"{1e3 * YAW_MAX:g} mrad{within}, where the contact table ends: it was continued linearly "
+        "in the square of the yaw."
     )
 
 

@@ -244,9 +244,9 @@ def test_a_run_that_begins_on_the_crossing_is_that_of_one_from_before_it(start):
     assert not any("within a range" in remark for remark in within.remarks)
 
 
-def thrown(y, vy, track):
+def thrown(y, vy, track, **more):
     """Run in which the leading wheelset is thrown aside ahead of the nose."""
-    initial = {"front.outer.wheelset": {"y": y, "vy": vy}}
+    initial = {"front.outer.wheelset": {"y": y, "vy": vy, **more}}
     settings = load_settings().with_values({"initial": initial, "output_rate": 2000.0})
     coach = load_vehicle("coach_manchester")
     return simulate(coach, track, speed=20.0, start=38.9, until=39.6, settings=settings)
@@ -264,6 +264,12 @@ def test_wheel_passes_the_nose_on_its_wrong_side():
     held = thrown(0.006, 1.5, crossing(check_rail=check_rail)), thrown(0.006, 1.5, crossing())
     aside = [np.abs(run["wheelset_lateral"][:, 0]).max() for run in held]
     assert aside[0] < 0.011 < 0.02 < aside[1]
+
+
+def test_yaw_beyond_the_tables_of_the_sections_is_remarked_with_their_own_end():
+    """At the second node of yaw: of 17 at 10 mrad, of the 3 of these coarse tables at 28.3."""
+    (remark,) = (r for r in thrown(0.0, 0.0, crossing(), yaw=0.032).remarks if "yawed" in r)
+    assert "by more than 60 mrad (28.3 mrad within track.sections), where" in remark
 
 
 def test_flange_that_climbs_goes_on():
