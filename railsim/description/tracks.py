@@ -8,8 +8,10 @@ from railsim.definitions import Track
 from railsim.definitions.excitations import Irregularity
 from railsim.definitions.excitations.measured import READING, Measured, largest_between_rows
 from railsim.definitions.track.alignment_rules import cant_at
+from railsim.definitions.track.check_rail import FAR, CheckRail
 from railsim.definitions.track.elements import Section
 from railsim.definitions.track.layout import cant_sections, curvature_sections, gradient_sections
+from railsim.definitions.track.rail_sections import RailSections
 from railsim.description.values import Description, Parts, either, short
 from railsim.errors import argument_error
 from railsim.table import Column, Table
@@ -34,7 +36,7 @@ def _checked(speed: float | str) -> float:
 
 
 def describe_track(track: Track, speeds: Sequence[float | str]) -> Description:
-    """Return plan with cant, speeds of the curves, vertical profile, irregularities."""
+    """Return plan with cant, speeds of the curves, crossings, vertical profile, irregularities."""
     speeds_si = [_checked(speed) for speed in speeds]
     plan, cant = curvature_sections(track), cant_sections(track)
     bends = {curve.section: curve for curve in curves(track)}
@@ -46,9 +48,11 @@ def describe_track(track: Track, speeds: Sequence[float | str]) -> Description:
         "cant": [_row(section) for section in cant],
         "vertical": [_row(section) for section in gradient_sections(track)],
         "mileage": (track.mileage_at(0.0), track.mileage_at(track.length)),
+        "sections": [_sections(part) for part in track.sections],
+        "check_rail": [_check_rail(part) for part in track.check_rail],
         "irregularities": [_irregularity(part) for part in track.irregularities],
     }
-    parts: Parts = [*_track_lines(track, data["mileage"]), "", _plan_table(data["plan"], speeds_si)]
+    parts: Parts = [*_track_lines(track, data), "", _plan_table(data["plan"], speeds_si)]
     if speeds_si and any("cant_deficiency" in row for row in data["plan"]):
         parts.append("columns of speeds: cant deficiency in mm")
     ends = [Column("begin", "from", "m", "g"), Column("end", "to", "m", "g")]
@@ -66,7 +70,7 @@ def describe_track(track: Track, speeds: Sequence[float | str]) -> Description:
     return Description(data, parts)
 
 
-def _track_lines(track: Track, mileage: tuple[float, float]) -> list[str]:
+def _track_lines(track: Track, data: dict[str, Any]) -> list[str]:
     slope = f"1:{1.0 / track.inclination:g}" if track.inclination else "upright"
     lines = [
         track.name,
@@ -77,7 +81,8 @@ def _track_lines(track: Track, mileage: tuple[float, float]) -> list[str]:
     if track.speed is not None:
         lines.append(f"  permitted speed {track.speed:g} m/s ({3.6 * track.speed:.0f} km/h)")
     if track.mileage or track.falling_mileage:
-        lines.append("  mileage from km {:.3f} to km {:.3f}".format(*(m / 1e3 for m in mileage)))
+        ends = (m / 1e3 for m in data["mileage"])
+        lines.append("  mileage from km {:.3f} to km {:.3f}".format(*ends))
     if track.cant_rotation == "inner_rail":
         lines.append("  cant turns the track about the inner rail")
     if track.gauge_widening:
@@ -87,7 +92,28 @@ def _track_lines(track: Track, mileage: tuple[float, float]) -> list[str]:
         lines.append(f"  friction with slip down to {falling.rest:g} of it, {falling.decay:g} s/m")
     if track.third_body != (1.0, 1.0):
         lines.append(f"  third body: Kalker's coefficients times {either(track.third_body)}")
+    lines += [
+        "  {rail} rail of {number} sections from s = {begin:g} to {end:g} m".format(**part)
+        for part in data["sections"]
+    ]
+    for part in data["check_rail"]:
+        along = "from s = {begin:g} to {end:g} m" if part["begin"] > -FAR else "all along"
+        least = f"flangeway {1e3 * part['flangeway']:g} mm at least"
+        lines.append(f"  check rail beside the {part['rail']} rail {along.format(**part)}, {least}")
     return [*lines, f"  source: {track.source}"] if track.source else lines
+
+
+def _sections(part: RailSections) -> dict[str, Any]:
+    """Return a range of sections; of what was read the number of sections in it."""
+    places = [one.s + part.shift for one in part.contours or ()]
+    number = sum(part.begin <= s <= part.end for s in places)
+    return {"rail": part.rail, "begin": part.begin, "end": part.end, "number": number}
+
+
+def _check_rail(part: CheckRail) -> dict[str, Any]:
+    """Return ends and least flangeway of a check rail."""
+    s, widths = zip(*part.rows, strict=True)
+    return {"rail": part.rail, "begin": s[0], "end": s[-1], "flangeway": min(widths)}
 
 
 def _irregularity(part: Irregularity) -> dict[str, Any]:

@@ -173,6 +173,20 @@ def test_what_a_track_file_gives_is_told_in_the_units_of_the_trade(capsys, tmp_p
     assert "third body" not in text
 
 
+def test_crossings_and_check_rails_are_told():
+    """The list has 91 sections in its range; the narrowest flangeway is 41 mm."""
+    found = describe_track(load_track("crossing_56e1_r245_1in9.25"), [])
+    assert "  right rail of 91 sections from s = 49.45 to 51.68 m" in found.parts
+    (words,) = (line for line in found.parts if "check rail" in str(line))
+    assert words == (
+        "  check rail beside the left rail from s = 47.103 to 52.793 m, flangeway 41 mm at least"
+    )
+    expected = {"rail": "left", "begin": 47.103, "end": 52.793, "flangeway": 0.041}
+    assert found.data["check_rail"] == [expected]
+    track = load_track("curve_r250", ["check_rail=[{rail='left',flangeway=0.045}]"])
+    assert "beside the left rail all along, flangeway 45 mm" in str(describe_track(track, []).parts)
+
+
 def test_remarks_are_shown(capsys):
     lines = lines_of(capsys, "curve_r250", "--set", "rounding=80.0")
     assert any(line.startswith("remark: plan.1") for line in lines)
