@@ -43,7 +43,7 @@ GONE = 1e-3  # share of a disturbance that counts as nothing after a period
 DIFFERENCE = 1e-5  # of the difference quotients, in scaled units
 MULTIPLIER = 1e-3  # by which a multiplier may exceed 1: error of difference quotients
 SMALLEST_SHARE = 1.0 / 256.0  # of the given step
-FOLD = 3e-3  # share of the arc length to which a fold is sought; its speed is of second order
+FOLD = 5e-3  # m/s, rise of the speed with which a motion counts as a fold; the speed is closer
 BENT = 1.4  # ratio of the way to the next motion to its arc length: 45 degrees off the tangent
 NEAR = 1e-2  # scaled units, within which the tangent tells nothing
 LEAD = 0.05  # least cosine between a tangent and the direction it is to lead in
@@ -224,22 +224,22 @@ class Shooting:
 
     def fold(self, before: PeriodicMotion, after: PeriodicMotion) -> PeriodicMotion:
         """Return the motion where the branch turns back between two."""
-        found, length = {}, float(self._way(before, after) @ before.tangent)
+        length = float(self._way(before, after) @ before.tangent)
+        found = {0.0: before, length: after}
 
-        def forward(share: float) -> float:
+        def rise(share: float) -> float:
+            """Of the speed over the whole length, with the slope at a motion [m/s]."""
             if share not in found:
                 found[share] = self.ahead(before, share)[0]
-            return float(found[share].tangent[-1])
+            value = float(found[share].tangent[-1] * length * self._scale[-1])
+            return value if abs(value) > FOLD else 0.0
 
-        first = 1e-6 * length
+        if rise(0.0) * rise(length) > 0.0:
+            return after
         try:
-            if forward(first) * forward(length) > 0.0:  # of a fold with a kink: the nearer motion
-                return after
-            root = float(brentq(forward, first, length, xtol=FOLD * length))
-            forward(root)
+            return found[brentq(rise, 0.0, length, xtol=NEAR)]
         except ModelError:  # which is no reason not to go on from it
             return after
-        return found[root]
 
     def _ends(self, rows: Floats) -> Floats:
         """x(T) of several scaled u, one a row, scaled."""

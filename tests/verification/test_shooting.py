@@ -98,6 +98,21 @@ def test_the_fold_is_where_the_closed_form_turns_back(branch):
     assert shooting.fold(motions[k + 1], motions[k + 2]) is motions[k + 2]
 
 
+def test_a_fold_takes_few_searches_and_of_motions_that_are_known_none(monkeypatch, branch):
+    """Each takes a matrix, 10 s where a period lasts 3 s."""
+    shooting, _, motions = branch
+    (k,) = (k for k, m in enumerate(motions[1:]) if motions[k].tangent[-1] < 0.0 < m.tangent[-1])
+    searches, solved = [], shooting._solved
+    monkeypatch.setattr(shooting, "_solved", lambda *at: searches.append(at) or solved(*at))
+    fold = shooting.fold(motions[k], motions[k + 1])
+    assert fold.speed == pytest.approx(45.0, abs=1e-4)
+    assert len(searches) <= 3
+    searches.clear()
+    assert shooting.fold(fold, motions[k + 1]) is fold
+    assert shooting.fold(motions[k], fold) is fold
+    assert searches == []
+
+
 @pytest.mark.parametrize(("speed", "share"), [(46.0, 0.723607), (48.0, 0.887298), (48.0, 0.112702)])
 @pytest.mark.parametrize("phase", [0.0, 2.0, 4.0])
 def test_the_motion_nearest_to_that_of_a_run_is_found_from_any_phase(branch, speed, share, phase):
