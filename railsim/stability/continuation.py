@@ -23,7 +23,7 @@ Progress = Callable[[float], None]
 LARGEST_AMPLITUDE = 12e-3  # m, at which a branch is followed no further
 ARC_STEP = 1.5  # units of the arc length, about 1 mm or 1 m/s
 MOST_MOTIONS = 20  # of one branch
-FIRST = 0.2e-3  # m, amplitude at which a branch's first shape is taken
+FIRST = 0.2e-3  # m, amplitude at which a branch's first shape is taken, and below which it ends
 FROM_END = 1.0  # m/s above the slow end of a branch of runs, where its motion is taken
 OBSERVED = 10.0  # s of a run that tells why none is periodic
 RUNS = ("up", "down", "further")  # branches of runs
@@ -130,11 +130,14 @@ def _follow(
         return
     try:
         for now in shooting.followed(before, ARC_STEP, within):
-            if before.tangent[-1] * now.tangent[-1] < 0.0:
+            rests = now.amplitude < min(FIRST, before.amplitude)
+            if before.tangent[-1] * now.tangent[-1] < 0.0 and not rests:
                 found.folds.append(_point(shooting.fold(before, now)))
             points.append(_point(now))
             tell(len(points) / MOST_MOTIONS)
             before = now
+            if rests:  # beyond it the same motions follow, half a period later
+                break
     except ModelError as error:
         found.remarks.append(
             f"continuation: {name} is followed to {before.speed:.4g} m/s only: {error}"

@@ -775,6 +775,28 @@ def test_a_branch_is_followed_from_its_birth_through_its_fold_out_of_the_range(m
     assert not found.remarks
 
 
+def test_a_branch_ends_where_it_comes_back_to_rest(monkeypatch):
+    """As the lower sway of a coach that is stable again from some speed on.
+
+    |sin p| mm at 60 + 4 sin^2(p/2) m/s: rest at 64 m/s, p = pi, then all of it once more.
+    """
+
+    class Arch(Parabola):
+        def at(self, p):
+            speed, slope = 60.0 + 4.0 * np.sin(0.5 * p) ** 2, 2.0 * np.sin(p)
+            return SimpleNamespace(
+                p=p, speed=speed, amplitude=1e-3 * abs(np.sin(p)), frequency=5.0,
+                tangent=np.array([1.0, slope]), is_stable=True,
+            )  # fmt: skip
+
+    found, _ = continued(monkeypatch, Arch(0.5), speeds=(50.0, 70.0))
+    (branch,) = found.branches
+    p = 0.5 * np.arange(1, 7)
+    np.testing.assert_allclose(branch.column("amplitude"), 1e-3 * np.sin(p))
+    assert not found.folds
+    assert not found.remarks
+
+
 @pytest.mark.parametrize(
     ("birth", "how", "count", "words"),
     [
