@@ -455,7 +455,6 @@ def _conclude(
         found.type = "subcritical"
     elif not only_from_rest:
         found.type = "supercritical"
-    force = _unstable_force(vehicle, prepared.Q0)
     # a ramp passes the end of a branch late
     branches = [branch for branch in found.branches if branch.direction != "ramp"]
     if only_ramp := not branches:
@@ -463,7 +462,9 @@ def _conclude(
         branches = [Branch("ramp", points) for points in kept]
     branches += [Branch("sustained", [point]) for point in found.nonlinear.values() if point]
     found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.searched_to)
-    found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.searched_to)
+    if not only_from_rest:  # shooting knows no forces
+        force = _unstable_force(vehicle, prepared.Q0)
+        found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.searched_to)
     if only_ramp and lowest is not None:
         found.remarks.append(
             "limits: on the falling ramp alone; at constant speed they are exceeded from up to "

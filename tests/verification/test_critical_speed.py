@@ -310,6 +310,8 @@ def test_motions_that_begin_at_rest_alone_do_not_tell_that_nothing_hunts_below(s
     CRITICAL._conclude(found, load_vehicle("coach_manchester"), begins, begins)
     assert found.type == kind
     assert any("may last to lower speeds" in said for said in found.remarks) is (ramp is None)
+    # its motions have no forces: whether they exceed the limit is not known
+    assert (found.instability_limit is None) is (ramp is None)
 
 
 def test_branches_stand_in_a_dataset_as_they_were_found(monkeypatch):
