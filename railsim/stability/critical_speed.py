@@ -456,10 +456,12 @@ def _conclude(
     elif not only_from_rest:
         found.type = "supercritical"
     # a ramp passes the end of a branch late
-    branches = [branch for branch in found.branches if branch.direction != "ramp"]
-    if only_ramp := not branches:
-        kept = [[p for p in one.points if p.speed >= one.end] for one in found.branches]
-        branches = [Branch("ramp", points) for points in kept]
+    only_ramp = "ramp" in found.nonlinear and "bifurcation" not in found.nonlinear
+    branches = [
+        Branch(one.direction, [point for point in one.points if point.speed >= one.end])
+        for one in found.branches
+        if only_ramp or one.direction != "ramp"
+    ]
     branches += [Branch("sustained", [point]) for point in found.nonlinear.values() if point]
     found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.searched_to)
     if not only_from_rest:  # shooting knows no forces

@@ -293,6 +293,20 @@ def test_what_a_ramp_alone_finds_counts_for_the_limits():
     assert found.instability_limit.speed == 54.3
 
 
+def test_a_ramp_counts_for_the_limits_beside_small_motions_without_forces():
+    """Half the limit is passed on the way from 1 kN at 25.6 m/s to 40 kN at 54.3 m/s."""
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=120.0)
+    slow, fast = Point(25.6, 8.6e-3, 0.9, 1e3), Point(54.3, 9.5e-3, 1.9, 40e3)
+    late, small = Point(25.0, 8.5e-3, 0.9, 1e3), Point(84.0, 1e-3, 3.0)
+    found.nonlinear = {"ramp": slow, "continuation": small}
+    found.branches = [Branch("ramp", [fast, slow, late], 25.6), Branch("continuation", [small])]
+    begins = SimpleNamespace(Q0=np.full((4, 2), 7e4), already=False, parameter=83.2)
+    CRITICAL._conclude(found, load_vehicle("coach_manchester"), begins, begins)
+    share = (found.instability_limit.limit - 1e3) / 39e3
+    assert found.instability_limit.speed == pytest.approx(25.6 + share * 28.7)
+    assert found.amplitude_limit.speed == 25.6  # at 25 m/s it was dying
+
+
 @pytest.mark.parametrize(
     ("slowest", "ramp", "kind"),
     [(40.06, None, ""), (39.2, None, "subcritical"), (40.06, 39.8, "subcritical"),
