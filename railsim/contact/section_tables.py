@@ -55,7 +55,8 @@ from railsim.kernels.contact_table import N_PATCH, G
 from railsim.profiles.profile import Profile
 
 INWARDS, OUTWARDS = 0.012, 0.012  # m, lateral positions that a table covers
-ROLLS, YAWS = 4, 2  # nodes of the plain table to each side of no roll, and from no yaw on
+ROLLS = 4  # nodes of the plain table to each side of no roll
+YAWS = slice(0, 3, 2)  # those of no yaw and of 14 mrad: a two-axle wagon yaws by 17 mrad in R 245 m
 FADE = 0.05  # m, from the plain rail to the sections
 TOLERANCE, SHARED = 4e-6, 5e-7  # m, of the heights between nodes; where two rails may carry
 CLOSEST, FARTHEST = 4e-3, 64e-3  # m, distances of nodes
@@ -120,7 +121,7 @@ def section_table(given: Range) -> ContactTable:
     inner, outer = (round((end - plain.y0) / plain.dy) for end in (-INWARDS, OUTWARDS))
     y = np.arange(max(inner, 1), min(outer, plain.values.shape[3] - 3) + 1)
     rolls = np.arange(middle - ROLLS, middle + ROLLS + 1)
-    cut = plain.values[:, :YAWS, rolls[0] : rolls[-1] + 1, y[0] : y[-1] + 1]
+    cut = plain.values[:, YAWS, rolls[0] : rolls[-1] + 1, y[0] : y[-1] + 1]
     wanted: list[tuple[RailPart, float]] = []
     known: dict[tuple[int, bytes], int] = {}
     rows: list[list[tuple[float, int, Floats]]] = []
@@ -151,7 +152,7 @@ def section_table(given: Range) -> ContactTable:
             return cut[zones]
         rail = rolled_curve(*wanted[table - 1], radius, given.zero)
         rail = replace(rail, z=rail.z + rise)
-        nodes = lateral, unstretched_roll(stretched), plain.w[:YAWS]
+        nodes = lateral, unstretched_roll(stretched), plain.w[YAWS]
         fields = spline_coefficients(generator.values(rail, *nodes, 1), stretched)
         return fields[zones, :, 1:-1, 1:-1]
 
@@ -167,7 +168,7 @@ def section_table(given: Range) -> ContactTable:
         values=values,
         y0=float(plain.y0 + plain.dy * y[0]),
         roll0=float(plain.roll0 + plain.droll * rolls[0]),
-        w=plain.w[:YAWS],
+        w=plain.w[YAWS].copy(),
         description={**about, "parts": described, "tape": tape, "rise": rise},
     )
 
