@@ -327,9 +327,9 @@ def test_wheels_that_are_not_round_need_rails_with_mass(elastic, massless, words
 
 
 def test_counts_are_told_in_the_singular_and_in_parts_of_all():
-    assert "In 1 evaluation a wheel was yawed" in yaw_range(1)
-    assert "In 2 evaluations a wheel was yawed" in yaw_range(2)
-    assert yaw_range(0) == ""
+    assert "In 1 evaluation a wheel was yawed" in yaw_range(1, 0.0)
+    assert "In 2 evaluations a wheel was yawed" in yaw_range(2, 0.0)
+    assert yaw_range(0, 0.0) == ""
     assert "3 of 200 contact patches in the time loop (1.5e-02)" in creep_range(3, 200)
     assert "within the 3 s after" in evaluated_whole(3.0, 2.9)
     assert evaluated_whole(3.0, 3.1) == evaluated_whole(0.0, 0.0) == ""
