@@ -114,7 +114,8 @@ def zone_at(rails, part, i, k, zone):
 def fall_at(rails, part, zone, s, otherwise, cell, weights):
     """Slope of a zone's gap at another position, at the nearest node in y and roll [1].
 
-    The node behind is nearer where it weighs more.  A wheelset in the middle is on a node: were it
+    The node behind is nearer where it weighs more; `weights` as from `cell_weights`: 1 and 2 are
+    those of the cell's ends in y, 9 and 10 in roll.  A wheelset in the middle is on a node: were it
     that of its cell, round-off would decide which.
     """
     i = cell_of(rails, part, s)
