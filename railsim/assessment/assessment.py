@@ -108,7 +108,7 @@ class Assessment:
         for report in self.zones:
             for row in report.rows if report.zone == zone else ():
                 before = found.get(row.criterion.name)
-                if before is None or not row.rank <= before[1].rank:
+                if before is None or row.rank > before[1].rank:
                     found[row.criterion.name] = report, row
         return found
 

@@ -61,11 +61,17 @@ class Assessed:
         return self.estimate.value > self.limit + ROUNDING * abs(self.limit)
 
     @property
-    def rank(self) -> float:
-        """What the rows of a quantity are ordered by: share of the limit, else the value."""
+    def rank(self) -> tuple[bool, float]:
+        """What the rows of a quantity are ordered by: share of the limit, else the value.
+
+        Rows with too few values for an estimate come last, by their means.
+        """
+        value = self.estimate.value
+        if math.isnan(value):
+            return False, self.estimate.mean
         if not math.isnan(self.limit):
-            return self.share
-        return -self.estimate.value if self.criterion.kind == "smallest" else self.estimate.value
+            return True, self.share
+        return True, -value if self.criterion.kind == "smallest" else value
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""
@@ -120,7 +126,7 @@ class ZoneReport:
         found: dict[str, Assessed] = {}
         for row in (*self.rows, *self.information):
             before = found.get(row.criterion.name)
-            if before is None or not row.rank <= before.rank:
+            if before is None or row.rank > before.rank:
                 found[row.criterion.name] = row
         return list(found.values())
 

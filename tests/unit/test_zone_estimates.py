@@ -165,6 +165,19 @@ def test_rows_of_a_zone(zone, count, spread, signs, category, km_h, high, method
             assert row.estimate.value == best(one.estimate.value for one in rivals)
 
 
+def test_of_a_single_section_the_wheel_with_the_largest_value_is_shown():
+    """Without an estimate there is no share of the limit to go by: the largest mean."""
+    values = {("Y_over_Q", f"wheelset {w} outer"): [x] for w, x in ((1, 0.3), (2, 0.7), (3, 0.1))}
+    (one,) = made("4", 1, 0.0)
+    sections = [SectionValues(one.section, values)]
+    service = Service(admissible_speed=40.0, cant_deficiency=0.15, category="passenger")
+    about = Population("", VEHICLE, Q0), sections, [one.section], service, LIMITS
+    (report,) = zone_reports(*about, "normal")
+    (shown,) = report.nearest
+    assert math.isnan(shown.share)
+    assert (shown.place, shown.estimate.mean) == ("wheelset 2 outer", 0.7)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_a_quantity_exactly_at_its_limit_is_not_above_it(seed):
     """0.8 in all sections: the regression gives 0.8 to the last digits, above it or below."""
