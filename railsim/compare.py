@@ -89,7 +89,8 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
 def conditions(results: Mapping[str, Result]) -> dict[str, list[str]]:
     """Return what results differ in: the value of each in words, by key.
 
-    `speed` [m/s]; `track` and `vehicle`, their names; the keys of the files of both and of the
+    `speed` [m/s]; `distance`, from where to where, apart by 1 m or more, which peaks depend on;
+    `track` and `vehicle`, their names; the keys of the files of both and of the
     settings, which begin with `track.`, `vehicle.` and `settings.`; not what a run wrote.  Of
     vehicles with different names that differ in more than `MOST_KEYS`, the names alone.
     """
@@ -101,6 +102,9 @@ def conditions(results: Mapping[str, Result]) -> dict[str, list[str]]:
         "track": [track.name if on_track else "" for track in tracks],
         "vehicle": [vehicle.name if of_vehicle else "" for vehicle in vehicles],
     }
+    ends = np.array([one["distance"][[0, -1]] for one in each])
+    if np.ptp(ends, axis=0).max() >= 1.0:
+        whole["distance"] = [f"{begin:.6g} to {end:.6g}" for begin, end in ends]
     found = {key: words for key, words in whole.items() if len(set(words)) > 1}
     if len(of_vehicle) <= MOST_KEYS or "vehicle" not in found:
         found |= {f"vehicle.{key}": words for key, words in of_vehicle.items()}
@@ -112,7 +116,8 @@ def conditions(results: Mapping[str, Result]) -> dict[str, list[str]]:
 
 def condition_table(found: Mapping[str, Sequence[str]], labels: Iterable[str]) -> Table:
     """Return the conditions that differ, those of each result in a column."""
-    rows = [["speed (m/s)" if key == "speed" else key, *words] for key, words in found.items()]
+    units = {"speed": "speed (m/s)", "distance": "distance (m)"}
+    rows = [[units.get(key, key), *words] for key, words in found.items()]
     return Table(["conditions that differ", *map(printable, labels)], rows)
 
 

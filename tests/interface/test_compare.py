@@ -138,6 +138,7 @@ def test_conditions_that_differ_are_said_and_those_alike_are_not(files, tmp_path
     assert conditions({"base": example_result(), "alike": example_result(gain=2.0)}) == {}
     assert conditions({"base": example_result(), "other": other}) == {
         "speed": ["20", "15"],
+        "distance": ["0 to 980", "0 to 735"],  # 49 s
         "track.friction": ["0.4, 0.4", "0.4, 0.1"],
         "track.support.preset": ["ballasted", "rigid"],
         "settings.step": ["0.001", "none"],
@@ -147,6 +148,14 @@ def test_conditions_that_differ_are_said_and_those_alike_are_not(files, tmp_path
     head = capsys.readouterr().out.split("peaks")[0].splitlines()
     assert head[0].split() == ["conditions", "that", "differ", "base", "other"]
     assert head[1].split() == ["speed", "(m/s)", "20", "15"]
+
+
+def test_parts_of_the_track_that_differ_are_said():
+    """Peaks of 340 m against those of 320 m, at 20 m/s; 0.8 m are where a run happens to end."""
+    base, shorter = example_result(duration=17.0), example_result(duration=16.0)
+    found = conditions({"base": base, "shorter": shorter})
+    assert found == {"distance": ["0 to 340", "0 to 320"]}
+    assert conditions({"base": base, "alike": example_result(duration=16.96)}) == {}
 
 
 def test_changed_keys_of_a_vehicle_are_said_with_their_values():
