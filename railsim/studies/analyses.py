@@ -84,7 +84,7 @@ def _check(analysis: Analysis) -> None:
 
 
 def _assessed(case: "Case", analysis: AssessAnalysis, result: Result | None) -> Outcome:
-    """Largest share of each limit; values of comfort, wear and safety.
+    """Largest share of each limit and value of a section; values of comfort, wear and safety.
 
     None, and a remark, where a run ended too early for them: what it is, its status says.
     """
@@ -109,6 +109,12 @@ def _assessed(case: "Case", analysis: AssessAnalysis, result: Result | None) -> 
         numbers["largest_share"] = max(shares.values())
     if found.verdict:
         numbers["exceeded"] = float(found.exceeded)
+    judged = {row.criterion.name for row in found.worst}
+    for section in (one for report in found.zones for one in report.values):
+        for (quantity, _), values in section.values.items():
+            if quantity in judged:
+                name = f"{quantity}_largest"
+                numbers[name] = max(*values, numbers.get(name, -math.inf))
     said = coarse_remarks(case.settings, case.speed)
     return {**numbers, **_largest(found.record(), analysis.standard)}, said
 

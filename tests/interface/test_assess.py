@@ -25,7 +25,7 @@ from railsim.definitions.loading import (
     load_own_sections,
     load_stationary_limits,
 )
-from railsim.definitions.study.analyses import AssessAnalysis
+from railsim.definitions.study.analyses import AssessAnalysis, unit_of_number
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import InputError
 from railsim.notation import PATCHES, REQUESTED
@@ -966,6 +966,18 @@ def test_a_run_that_is_too_short_is_named_and_the_others_are_assessed(standard, 
     assert main(["assess", paths[0], paths[2], *given]) == 2
     faults = capsys.readouterr().err.splitlines()
     assert [line.split(":")[0] for line in faults] == ["first", "last"]
+
+
+def test_in_a_study_the_largest_value_of_a_section_is_a_number():
+    """The guiding force rises along the track: its median in the last section, with its unit."""
+    run = linear()
+    (found,) = assess(run)
+    asked = {"own": AssessAnalysis(kind="assess")}
+    case = SimpleNamespace(analyses=asked, settings=run.settings(), speed=20.0)
+    numbers, _ = analysed(case, run)
+    last = max(s.section.end for s in found.sections if s.counts) - 35.0
+    assert numbers["own.Y_qst_largest"] == pytest.approx(10e3 + 50.0 * last, abs=5.0)
+    assert unit_of_number("own.Y_qst_largest") == "N"
 
 
 @pytest.mark.parametrize("standard", ["comfort", "wear"])

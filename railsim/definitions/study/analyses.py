@@ -7,11 +7,15 @@ from pydantic import Field
 
 from railsim.definitions.base import Definition, Finite, NonNegative, Positive, Text
 
+_ACCELERATIONS = ("y", "z", "y_rms", "z_rms", "y_qst", "y_safety", "z_safety", "instability")
 # units of the numbers, by what stands behind the analysis' name
 UNITS = {
     **dict.fromkeys(("linear", "ramp", "bifurcation", "continuation"), "m/s"),
     **dict.fromkeys(("T_gamma", "T_gamma_largest", "Q", "Y", "sum_Y", "sum_abs_Y"), "N"),
     **{"frequency": "Hz", "attack": "rad", "lateral": "m", "car_roll": "rad"},
+    # of sections
+    **dict.fromkeys((f"{q}_largest" for q in ("sum_Y", "instability", "Q", "Q_qst", "Y_qst")), "N"),
+    **{f"{b}_{q}_largest": "m/s2" for b in ("body", "frame") for q in _ACCELERATIONS},
 }
 
 
