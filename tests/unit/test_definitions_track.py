@@ -547,3 +547,13 @@ def test_replace_validates_the_copy():
     assert straight.replace(friction=0.2).friction == (0.2, 0.2)
     with pytest.raises(InputError, match=r"friction: -0.2; must be greater than or equal to 0"):
         straight.replace(friction=-0.2)
+
+
+@pytest.mark.parametrize(("length", "told"), [(50.0, True), (60.0, False)])
+def test_sections_of_rails_that_reach_beyond_the_track_are_remarked_on(length, told):
+    """The shipped crossing is from 49.45 to 51.68 m."""
+    crossing = load_track("crossing_56e1_r245_1in9.25")
+    cut = crossing.replace(plan=[{"type": "STR", "length": length}], check_rail=[])
+    said = [str(remark) for remark in track_remarks(cut)]
+    words = "sections.0: from 49.45 to 51.68 m, partly beyond the track's 50 m"
+    assert (words in said) == told

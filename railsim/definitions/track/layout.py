@@ -148,6 +148,9 @@ def track_remarks(track: "Track") -> list[Remark]:
                 at = begin - shift + to
                 text += f"; is it a mileage? shift = {to:.9g} puts its begin at s = {at:g}"
             remarks.append(Remark(key, text))
+        elif key.startswith("sections.") and (begin < 0.0 or end > track.length):
+            text = f"from {begin:g} to {end:g} m, partly beyond the track's {track.length:g} m"
+            remarks.append(Remark(key, text))
     return [*remarks, *_mileages(track)]
 
 
