@@ -190,6 +190,8 @@ def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fa
         allowed = f"a path, or the name of a shipped {kind}: {names.removeprefix('allowed: ')}"
     if beside is not None:
         return Fault(str(beside), "extends", found, allowed)
+    if "," in str(name):
+        allowed = "blanks between several names, no commas"
     return Fault(str(name), "", found, allowed)
 
 

@@ -47,7 +47,7 @@ def made_rows(grid: Grid, linked: Sequence[Grid], sample: Sample | None) -> list
     return rows
 
 
-SPEEDS = "such as 20 or 72km/h"
+SPEEDS = "such as 20 or 72km/h; blanks between several"
 
 
 def speed_of(text: str) -> float:

@@ -495,3 +495,8 @@ def test_errors_come_whole_from_another_process():
         assert type(sent) is type(error)
         assert sent.faults == error.faults
         assert str(sent) == str(error)
+
+
+def test_names_in_one_word_are_told_to_be_separated_by_blanks():
+    with pytest.raises(InputError, match="no file 'a,b'; blanks between several names, no commas"):
+        sources.find_file("a,b", "vehicle")
