@@ -43,8 +43,8 @@ TOO = 0.5  # a wheelset hunts, too, that swings this share of the farthest one
 
 HUNTS = "The vehicle hunts"  # how the sentence begins
 
-SEEN = ("time", "distance", "wheelset_distance", "wheelset_lateral", "sum_Y")
-"""Quantities that are looked at."""
+SEEN = ("time", "distance", "wheelset_distance", "wheelset_lateral", "sum_Y", "xi_x")
+"""Quantities that are looked at; `xi_x` by the remark on wheels that slide."""
 
 Rails = Callable[[Floats], tuple[Floats, Floats]]
 """Arc lengths to displacements of the rails (y_left, z_left, y_right, z_right) and their rates."""

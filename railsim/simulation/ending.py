@@ -31,12 +31,13 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: TakenUp | None) -> R
     # a run that ended before its evaluation began is evaluated as a whole
     evaluates = run.state[TIME] > prepared.evaluation
     of_peaks = run.evaluated if evaluates else run.extremes
-    swings = hunting(run.swings.close({}), run.plan.irregularity)
+    seen = run.swings.close({})
+    swings = hunting(seen, run.plan.irregularity)
     of_swings = ("frequency", "amplitude") if swings else ()
     asked = {"duration": inputs.duration, "until": inputs.until}
     attributes: dict[str, str | float | int] = {
         **verdict(run),
-        "remarks": "\n".join(run_remarks(run, swings)),
+        "remarks": "\n".join(run_remarks(run, swings, seen)),
         "vehicle_toml": vehicle.to_toml(),
         "track_toml": inputs.track.to_toml(),
         "settings_json": json.dumps(settings.model_dump(mode="json")),

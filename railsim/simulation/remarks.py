@@ -26,6 +26,7 @@ from railsim.kernels.vibration import (
     POSITION,
 )
 from railsim.notation import SIDES
+from railsim.result.data import Result
 from railsim.result.hunting import Hunting
 from railsim.simulation.advance import Run
 from railsim.simulation.outputs import run_extremes
@@ -42,6 +43,7 @@ ALTERNATES = 0.005, 0.02
 # h c/m of a commanded damper, m of the lighter body: a pair of yaw dampers alternates from there on
 COMMANDED = 0.3
 UNDISTURBED = 1e-5  # m, largest displacement of a wheelset that nothing has moved
+SLIDES, SLIDING = 0.05, 0.2  # longitudinal creepage, and s for which it is above that
 LONG = 1.0  # s: what is shorter is not taken for a test of stability
 YAW_MAX = TableGrid().yaw_max
 START_ALONE = "; all within the start of the run, which tables of peaks leave out"
@@ -59,8 +61,11 @@ def silent() -> Iterator[None]:
         log.setLevel(level)
 
 
-def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
-    """Return the remarks on a run that has ended, each once; `swings` is its limit cycle."""
+def run_remarks(run: Run, swings: Hunting | None, seen: Result) -> tuple[str, ...]:
+    """Return the remarks on a run that has ended, each once.
+
+    `swings` is its limit cycle, `seen` what showed that, see `railsim.result.hunting`.
+    """
     prepared, extremes = run.prepared, run_extremes(run.extremes, run.prepared.balance.Q0)
     model, Q0 = prepared.model, prepared.balance.Q0
     wheelsets, support = model.index.wheelsets, model.system.support
@@ -97,6 +102,12 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
         alternation(run.work.vibration, Q0, wheelsets, int(run.work.parts[DIVIDED])),
         commanded_dampers(
             model.system, model.index.actuators, run.work.memory, prepared.steps.smallest
+        ),
+        sliding(seen["time"], seen["xi_x"], wheelsets),
+        long_for_slip_control(
+            prepared.steps.smallest,
+            prepared.steps.too_long_below,
+            float(min(prepared.state[SPEED], run.state[SPEED])),
         ),
         creep_range(int(run.events[1]), int(run.events[0])),
         yaw_range(int(run.events[2]), float(np.sqrt(model.rails.arrays.w[-1]))),
@@ -283,6 +294,40 @@ def commanded_dampers(system: System, names: Sequence[str], memory: Floats, step
                 "damper may alternate from step to step: compare with half the step (--check-step)."
             )
     return ""
+
+
+def sliding(time: Floats, creepage: Floats, wheelsets: Sequence[str]) -> str:
+    """Remark on wheelsets that turn far slower or faster than they roll.
+
+    `time`: equal steps [s]; `creepage`: longitudinal, float64[time, wheelset, side], whose mean
+    over the wheels counts: curves and flanges make it differ between them.
+    """
+    mean = creepage.mean(axis=-1)
+    share = (np.abs(mean) > SLIDES).mean(axis=0) if len(time) else np.zeros(1)
+    w = int(np.argmax(share))
+    if not len(time) or share[w] * (time[-1] - time[0]) < SLIDING:
+        return ""
+    most = mean[np.nanargmax(np.abs(mean[:, w])), w]
+    verb, how = ("slide", "slower") if most > 0.0 else ("spin", "faster")
+    number = int(np.count_nonzero(share))
+    others = "" if number == 1 else f"; {number} wheelsets in all slide or spin"
+    return (
+        f"Wheels {verb}: {wheelsets[w]} turns more than {100.0 * SLIDES:.0f} % {how} than it rolls "
+        f"for {100.0 * share[w]:.3g} % of the run, up to {100.0 * abs(most):.0f} %{others}."
+    )
+
+
+def long_for_slip_control(step: float, below: float, slowest: float) -> str:
+    """Remark on a step [s] that slip control does not hold `below` a speed.
+
+    `slowest`: at the beginning or at the end of the run [m/s].
+    """
+    if slowest >= below:
+        return ""
+    return (
+        f"The step of {1e3 * step:.3g} ms is too long for slip control below {below:.3g} m/s: the "
+        "torque may alternate from step to step there; without settings.step the step follows."
+    )
 
 
 def vibration(

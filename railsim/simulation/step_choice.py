@@ -95,6 +95,11 @@ class StepChoice:
         self.varies = settings.drive.mode != "constant"
         self.smallest = math.inf
 
+    @property
+    def too_long_below(self) -> float:
+        """Speed below which a given step is too long for slip control [m/s]; 0 without either."""
+        return 0.0 if self._settings.step is None else self.smallest / self._slipping
+
     def at(self, speed: float, rate: float = 0.0) -> tuple[float, int]:
         """Step [s] at `speed`, which changes at `rate`, and number of steps to the next output."""
         interval = self._settings.output_interval(speed)

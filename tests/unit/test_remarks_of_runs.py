@@ -29,6 +29,8 @@ from railsim.simulation.remarks import (
     ended_by_the_track,
     evaluated_whole,
     lifted_wheels,
+    long_for_slip_control,
+    sliding,
     stability,
     uneven_wheels_on,
     unsettled_rails,
@@ -179,6 +181,40 @@ def test_each_remark_is_logged_once_and_what_was_asked_for_is_not(caplog):
     assert len(low_passed) == 1
     assert sorted(logged) == sorted(set(result.remarks) - set(low_passed))
     assert any("Nothing disturbs the vehicle laterally" in remark for remark in logged)
+
+
+@pytest.mark.parametrize(
+    ("creepage", "for_s", "words"),
+    [
+        (
+            1.0,
+            2.5,
+            "Wheels slide: b turns more than 5 % slower than it rolls for 25 % of the run, "
+            "up to 100 %.",
+        ),
+        (
+            -0.3,
+            10.0,
+            "Wheels spin: b turns more than 5 % faster than it rolls for 100 % of the "
+            "run, up to 30 %.",
+        ),
+        (1.0, 0.1, ""),  # a blow
+        (0.04, 10.0, ""),
+    ],
+)
+def test_a_wheelset_that_turns_slower_or_faster_than_it_rolls_is_told(creepage, for_s, words):
+    """Of 10 s; on a curve of R 25 m both wheels of the other creep by 3 %, one to either side."""
+    time = 0.01 * np.arange(1000)
+    values = np.zeros((len(time), 2, 2))
+    values[:, 0] = 0.08, -0.08
+    values[time < for_s - 1e-9, 1] = creepage
+    assert sliding(time, values, ("a", "b")) == words
+
+
+@pytest.mark.parametrize(("slowest", "told"), [(0.0, True), (3.9, True), (4.1, False)])
+def test_a_step_that_slip_control_does_not_hold_is_told(slowest, told):
+    said = long_for_slip_control(2e-3, 4.0, slowest)
+    assert ("2 ms is too long for slip control below 4 m/s" in said) == told
 
 
 @pytest.mark.parametrize(("start", "names"), [(39.0, ""), (39.5, "a"), (50.5, "b"), (45.0, "")])
