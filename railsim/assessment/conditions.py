@@ -169,7 +169,7 @@ def zone_conditions(
         found.append(_compared("mean radius", place, radius, wanted, wide, met=met))
     if wanted.radius is not None:
         right = sum(value.section.turn > 0 for value in report.values)
-        words = f"{right} sections to the right, {n - right} to the left"
+        words = f"{right} section{'s' * (right != 1)} to the right, {n - right} to the left"
         state = _stated(0 < right < n)
         found.append(Condition("curves to both hands", place, state, words, "both", "ours"))
     again = n - _independent(rows)
