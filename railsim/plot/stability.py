@@ -35,26 +35,33 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
     title = title or _title(found)
     if not found.branches:
         return _linear_figure(found, title)
-    figure = Picture(10.2, 7.2, title)
-    grid = figure.add_gridspec(3, 2, height_ratios=[2.4, 1.0, 1.0], width_ratios=[3.0, 1.0])
+    # shooting knows no forces
+    forces = any(np.isfinite(branch.column("sum_Y_rms")).any() for branch in found.branches)
+    rows = 3 if forces else 2
+    figure = Picture(10.2, 4.2 + rows, title)
+    heights, widths = [2.4, 1.0, 1.0][:rows], [3.0, 1.0]
+    grid = figure.add_gridspec(rows, 2, height_ratios=heights, width_ratios=widths)
     upper = figure.add_subplot(grid[0, 0])
-    lower = [figure.add_subplot(grid[row, 0], sharex=upper) for row in (1, 2)]
+    lower = [figure.add_subplot(grid[row, 0], sharex=upper) for row in range(1, rows)]
     for branch in found.branches:
         hunts = branch.column("amplitude") > THRESHOLD
         _draw(upper, branch, 1e3 * branch.column("amplitude"))
         _draw(lower[0], branch, np.where(hunts, branch.column("frequency"), np.nan))
-        _draw(lower[1], branch, 1e-3 * branch.column("sum_Y_rms"))
+        for axes in lower[1:]:
+            _draw(axes, branch, 1e-3 * branch.column("sum_Y_rms"))
     _mark(upper, found)
-    limits = found.amplitude_limit, found.instability_limit
-    for axes, limit, scale in zip((upper, lower[1]), limits, (1e3, 1e-3), strict=True):
+    limits = (upper, found.amplitude_limit, 1e3), (lower[-1], found.instability_limit, 1e-3)
+    words = "limits: 3 mm, half the limit of ΣY" if forces else "limit: 3 mm"
+    for axes, limit, scale in limits[: rows - 1]:
         if limit is not None:
-            words = "limits: 3 mm, half the limit of ΣY"
             axes.axhline(scale * limit.limit, color=LIMIT, lw=0.8, ls=(0, (1, 2)), label=words)
     words = f"Hunting, {found.type}" if found.type else "Hunting"
     upper.set(ylabel="amplitude of the wheelsets (mm)", title=words, xlim=_shown(found))
     upper.set(ylim=(0.0, None))
     lower[0].set(ylabel="frequency (Hz)")
-    lower[1].set(xlabel="speed (m/s)", ylabel="ΣY, rms (kN)", ylim=(0.0, None))
+    for axes in lower[1:]:
+        axes.set(ylabel="ΣY, rms (kN)", ylim=(0.0, None))
+    lower[-1].set(xlabel="speed (m/s)")
     if found.conicity_over_amplitude is not None:
         _conicity(figure.add_subplot(grid[0, 1], sharey=upper), found.conicity_over_amplitude)
     handles, labels = upper.get_legend_handles_labels()

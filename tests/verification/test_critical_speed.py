@@ -22,7 +22,7 @@ from railsim.model.equilibrium import tracks_under
 from railsim.plot.stability import bifurcation_figure
 from railsim.stability import continuation, vehicle_flow
 from railsim.stability import motion as motion_of
-from railsim.stability.branches import THRESHOLD, Branch, Point, first_beyond, lowest_of
+from railsim.stability.branches import THRESHOLD, Branch, Limit, Point, first_beyond, lowest_of
 from railsim.stability.continuation import settled_to
 from railsim.stability.critical_speed import (
     OF_CONICITY,
@@ -123,6 +123,23 @@ def test_frequencies_of_a_ramp_are_drawn_where_not_every_piece_has_one():
     found = CriticalSpeed(Contact("tangent", 3e-3, None), "x", where, branches=[branch])
     drawn = bifurcation_figure(found).axes[1].lines[0]
     assert drawn.get_xydata().tolist() == [[23.0, 1.3], [21.0, 1.2], [19.0, 1.1]]
+
+
+@pytest.mark.parametrize(
+    ("force", "labels", "limit"),
+    [(np.nan, ["frequency (Hz)"], "limit: 3 mm"),
+     (9e3, ["frequency (Hz)", "ΣY, rms (kN)"], "limits: 3 mm, half the limit of ΣY")],
+)  # fmt: skip
+def test_picture_without_forces_has_no_panel_for_them(force, labels, limit):
+    """Of continuation alone the panel of the track shift force was empty."""
+    branch = Branch("continuation", [Point(v, 1e-3, 4.0, force) for v in (40.0, 41.0)])
+    where = {"rails": "rigid", "friction": "0.4", "law": "fastsim"}
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), "x", where, branches=[branch])
+    found.amplitude_limit = Limit(None, 3e-3, False, 41.0)
+    *panels, legend = bifurcation_figure(found).axes
+    assert [axes.get_ylabel() for axes in panels] == ["amplitude of the wheelsets (mm)", *labels]
+    assert panels[-1].get_xlabel() == "speed (m/s)"
+    assert limit in [text.get_text() for text in legend.get_legend().get_texts()]
 
 
 def test_diagram_follows_what_hunts_below_its_lowest_speed():
