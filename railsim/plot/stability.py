@@ -130,10 +130,11 @@ def _mark(axes: Axes, found: CriticalSpeed) -> None:
         axes.plot(speeds, sizes, color="0.1", lw=0.9, ls=":", label=words)
     for method, lowest in found.nonlinear.items():
         if lowest is not None:
+            more = "" if lowest.stable else ", unstable"
             axes.plot(
                 [lowest.speed], [1e3 * lowest.amplitude], "o", ms=6, mfc="none",
                 color=BRANCHES["down" if method == "bifurcation" else method][0],
-                label=f"lowest by {method}: {lowest.speed:.2f} m/s",
+                label=f"lowest by {method}: {lowest.speed:.2f} m/s{more}",
             )  # fmt: skip
 
 

@@ -39,8 +39,8 @@ class Point:
         return self.stable and self.amplitude > THRESHOLD
 
     def record(self) -> dict[str, Any]:
-        """Return speed, amplitude and frequency as plain data."""
-        return {name: getattr(self, name) for name in COLUMNS[:3]}
+        """Return speed, amplitude, frequency and whether it is stable as plain data."""
+        return {name: getattr(self, name) for name in (*COLUMNS[:3], COLUMNS[-1])}
 
 
 def seen_at(speed: float, seen: Stretch, *, stable: bool = True) -> Point:

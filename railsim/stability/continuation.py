@@ -39,7 +39,8 @@ class Continued:
     branches: list[Branch] = field(default_factory=list)
     # first motion of the branch that begins where rest loses its stability
     begins: Point | None = None
-    folds: list[Point] = field(default_factory=list)  # where the branches turn back in speed
+    # where the branches turn back in speed, stable where one of the two motions beside it is
+    folds: list[Point] = field(default_factory=list)
     # which were not followed, or not to their end, and why
     remarks: list[str] = field(default_factory=list)
 
@@ -66,7 +67,7 @@ def followed_branches(
         found.remarks.append("continuation: no loss of stability at which it could begin")
     else:
         born = partial(_birth, motion, lost)
-        _follow(found, born, speeds, "the branch of small motions", telling(0))
+        _follow(found, born, speeds, "the branch of small motions", telling(0), pieces)
         if found.branches:
             found.begins = found.branches[0].points[0]
     tried: list[Sequence[Point]] = []
@@ -82,8 +83,7 @@ def followed_branches(
             f"the branch of runs from {piece[0].speed:.4g} to {piece[-1].speed:.4g} m/s, "
             f"{1e3 * seed.amplitude:.2f} mm at {seed.speed:.4g} m/s,"
         )
-        _follow(found, partial(_at, motion, seed), speeds, name, tell)
-    found.branches = [settled_to(branch, pieces) for branch in found.branches]
+        _follow(found, partial(_at, motion, seed), speeds, name, tell, pieces)
     return found
 
 
@@ -115,9 +115,11 @@ def _follow(
     speeds: tuple[float, float],
     name: str,
     tell: Progress,
+    pieces: Sequence[Sequence[Point]],
 ) -> None:
     """Add the branch from a motion on, or a remark on why it ends."""
     points: list[Point] = []
+    turns: list[tuple[int, Point]] = []  # folds, and the number of motions before each
 
     def within(now: PeriodicMotion) -> bool:
         inside = speeds[0] < now.speed < speeds[1] and now.amplitude < LARGEST_AMPLITUDE
@@ -132,7 +134,7 @@ def _follow(
         for now in shooting.followed(before, ARC_STEP, within):
             rests = now.amplitude < min(FIRST, before.amplitude)
             if before.tangent[-1] * now.tangent[-1] < 0.0 and not rests:
-                found.folds.append(_point(shooting.fold(before, now)))
+                turns.append((len(points), _point(shooting.fold(before, now))))
             points.append(_point(now))
             tell(len(points) / MOST_MOTIONS)
             before = now
@@ -148,7 +150,11 @@ def _follow(
             f"to {before.speed:.4g} m/s"
         )
     if points:
-        found.branches.append(Branch("continuation", points))
+        branch = settled_to(Branch("continuation", points), pieces)
+        found.branches.append(branch)
+        for number, fold in turns:
+            beside = branch.points[max(0, number - 1) : number + 1]
+            found.folds.append(replace(fold, stable=any(point.stable for point in beside)))
 
 
 def _point(motion: PeriodicMotion) -> Point:

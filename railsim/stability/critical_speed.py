@@ -415,7 +415,13 @@ def _by_continuation(
         found.onset = "supercritical" if rising else "subcritical"
         ends.append(Point(begins.parameter, 0.0, float(begins.modes[0].frequencies[0])))
     if ends:
-        found.nonlinear["continuation"] = min(ends, key=lambda point: point.speed)
+        found.nonlinear["continuation"] = slowest = min(ends, key=lambda point: point.speed)
+        if not slowest.stable:
+            found.remarks.append(
+                f"continuation: the motion of {1e3 * slowest.amplitude:.2f} mm at "
+                f"{slowest.speed:.4g} m/s is unstable, no run stays at it: a larger disturbance "
+                "does not die there; to what it grows was not followed (bifurcation, ramp)"
+            )
 
 
 def _unstable_force(vehicle: Vehicle, Q0: Floats) -> float:

@@ -113,12 +113,13 @@ class CriticalSpeed(Plottable):
         """Vehicle and critical speeds in words."""
         linear = f"linear {self.linear.speed:.4g} m/s" if self.linear else "no linear one"
         lowest = self.lowest
-        found = f"slowest sustained hunting {lowest.speed:.4g} m/s" if lowest else "none that lasts"
+        words = "slowest sustained hunting" if lowest and lowest.stable else "unstable motion at"
+        found = f"{words} {lowest.speed:.4g} m/s" if lowest else "none that lasts"
         return ", ".join([self.vehicle, linear, *([found] if self.nonlinear else [])])
 
     @property
     def lowest(self) -> Point | None:
-        """Slowest sustained hunting of all methods; None where there is none."""
+        """Slowest hunting of all methods, unstable only by continuation; None: there is none."""
         known = [point for point in self.nonlinear.values() if point is not None]
         return min(known, key=lambda point: point.speed, default=None)
 
@@ -210,7 +211,8 @@ class CriticalSpeed(Plottable):
                 yield f"non-linear, {method}", None, None, None, none
             else:
                 frequency = point.frequency if math.isfinite(point.frequency) else None
-                yield f"non-linear, {method}", point.speed, frequency, point.amplitude, ""
+                words = "" if point.stable else "unstable"
+                yield f"non-linear, {method}", point.speed, frequency, point.amplitude, words
         for jump in self.jumps:
             words = "rising" if jump.direction == "up" else "falling"
             to = f"to {1e3 * jump.to:.2f} mm"

@@ -846,10 +846,14 @@ def test_a_branch_ends_at_a_number_an_amplitude_or_a_speed(monkeypatch, birth, h
     assert [words in remark for remark in found.remarks] == ([True] if words else [])
 
 
+# of 0.75 mm, on the lower arm
+UNSTABLE = "at 56.25 m/s is unstable, no run stays at it"
+
+
 @pytest.mark.parametrize(
     ("low", "last", "slowest", "words"),
-    [(50.0, np.inf, 56.0, []), (50.0, 1.6, 56.25, ["to 56.25 m/s only"]),
-     (57.5, np.inf, 56.25, ["hunts still at the lower end, 57.5 m/s"])],
+    [(50.0, np.inf, 56.0, []), (50.0, 1.6, 56.25, ["to 56.25 m/s only", UNSTABLE]),
+     (57.5, np.inf, 56.25, [UNSTABLE, "hunts still at the lower end, 57.5 m/s"])],
 )  # fmt: skip
 def test_a_branch_that_is_left_before_its_fold_goes_on_to_its_slowest_motion(
     monkeypatch, low, last, slowest, words
@@ -864,6 +868,12 @@ def test_a_branch_that_is_left_before_its_fold_goes_on_to_its_slowest_motion(
     assert found.onset == "subcritical"
     assert len(found.remarks) == len(words)
     assert all(end in said for said, end in zip(found.remarks, words, strict=True))
+    # at the fold begins the upper arm, which is stable
+    stable = slowest == 56.0
+    assert found.nonlinear["continuation"].record()["stable"] is stable
+    assert found.title.endswith(
+        "slowest sustained hunting 56 m/s" if stable else "unstable motion at 56.25 m/s"
+    )
 
 
 def test_a_branch_of_runs_is_followed_once_and_where_it_is_not_known_yet(monkeypatch):
