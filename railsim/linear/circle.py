@@ -23,6 +23,7 @@ def placed(state: Floats) -> Floats:
 
 def left_out(vehicle: Vehicle, track: Track, settings: Settings, model: Model) -> tuple[str, ...]:
     """Remark on what a track of constant curvature and steady rolling leave out."""
+    line = (*track.plan, *track.cant, *track.vertical)
     parts = {
         "controllers (actuators get no command)": vehicle.controllers,
         "applied forces": len(model.system.loads.body),
@@ -34,6 +35,8 @@ def left_out(vehicle: Vehicle, track: Track, settings: Settings, model: Model) -
         "sections of rails": track.sections,
         "wheels that are not round": model.wheels.uneven,
         "transient creep forces": settings.transient_creep,
+        "curves, cant and gradients of the track": any(any(part.ends) for part in line),
+        "irregularities": track.irregularities,
     }
     found = [name for name, there in parts.items() if there]
     return (f"left out here, where rolling is steady: {', '.join(found)}",) if found else ()

@@ -420,7 +420,7 @@ def _by_continuation(
             found.remarks.append(
                 f"continuation: the motion of {1e3 * slowest.amplitude:.2f} mm at "
                 f"{slowest.speed:.4g} m/s is unstable, no run stays at it: a larger disturbance "
-                "does not die there; to what it grows was not followed (bifurcation, ramp)"
+                "grows to another one, which was not followed from there"
             )
 
 

@@ -413,6 +413,22 @@ def test_gauge_widening_is_left_out_of_steady_curving_with_a_remark():
     assert any("left out" in one and "gauge widening" in one for one in found.remarks)
 
 
+@pytest.mark.parametrize(
+    ("name", "values", "words"),
+    [("straight", [], None),
+     ("curve_r250", [], "curves, cant and gradients of the track"),
+     ("straight", ["cant=[{type='CST',length=1e4,cant=0.05}]"], "curves, cant and gradients"),
+     ("straight", ["vertical=[{type='CST',length=1e4,gradient=0.01}]"], "curves, cant and gr"),
+     ("straight", ["irregularities=[{type='dip',s=9.0,length=2.0,depth=6e-3}]"], "irregularities")],
+)  # fmt: skip
+def test_curves_and_irregularities_of_a_track_are_left_out_with_a_remark(name, values, words):
+    """Modes are those of straight, smooth track, on whatever line."""
+    track = railsim.load_track(name, values)
+    found = railsim.modes(railsim.load_vehicle("coach_manchester"), track, speed=35.0)
+    said = [one for one in found.remarks if "left out" in one]
+    assert [words in one for one in said] == ([True] if words else [])
+
+
 def test_friction_and_support_are_those_at_the_beginning_of_the_track():
     """What they are further on counts for nothing, and is said."""
     coach, plain = railsim.load_vehicle("coach_manchester"), railsim.load_track("straight")
