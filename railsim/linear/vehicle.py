@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -77,11 +78,13 @@ class Contact:
         faults, (low, high), size = Faults(), CONICITIES, self.amplitude
         known, found = self.linearisation in LINEARISATIONS, f"found '{self.linearisation}'"
         faults.require(known, "linearisation", found, " or ".join(LINEARISATIONS))
-        positive, found = math.isfinite(size) and size > 0.0, f"found {size:.12g} m"
+        positive = isinstance(size, Real) and 0.0 < size < math.inf
+        found = f"found {size} m"
         faults.require(positive, "amplitude", found, "a positive number of m")
         used = self.linearisation == "harmonic" or size == AMPLITUDE
         faults.require(used, "amplitude", found, "only with linearisation harmonic")
-        inside = self.conicity is None or low <= self.conicity <= high
+        given = self.conicity
+        inside = given is None or (isinstance(given, Real) and low <= given <= high)
         faults.require(inside, "conicity", f"found {self.conicity}", f"{low:g} to {high:g}")
         return faults
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from numbers import Real
+from numbers import Integral, Real
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def critical_speed(
     linearisation: str = "tangent",
     amplitude: float = AMPLITUDE,
     conicity: float | None = None,
-    excitations: Sequence[float] = EXCITATIONS,
+    excitations: float | Sequence[float] = EXCITATIONS,
     over_amplitude: bool = True,
     settings: Settings | None = None,
     profiles: Mapping[str, Profile] | None = None,
@@ -78,7 +78,7 @@ def critical_speed(
         Speeds of a bifurcation diagram; refused where there is none.
     linearisation, amplitude, conicity
         Of the linear critical speed, as in `railsim.modes`; given cones hold for all methods.
-    excitations : sequence of float
+    excitations : float or sequence of float
         Sizes of the disturbances from which hunting is sought: lateral displacement of a wheelset
         in the shape of the hunting mode [m].
     over_amplitude : bool
@@ -98,6 +98,7 @@ def critical_speed(
         There is no equilibrium, or no stable step.
     """
     methods = [methods] if isinstance(methods, str) else methods
+    excitations = np.ravel(excitations).tolist()
     contact = Contact(linearisation, amplitude, conicity)
     low, high = checked(contact, methods, low, high, points, excitations)
     settings, track = settings or Settings(), track or load_track("straight")
@@ -179,10 +180,11 @@ def checked(
     if not faults:
         words = f"less than the highest, {fastest:.12g} m/s"
         faults.require(slowest < fastest, "low", f"found {slowest:.12g} m/s", words, "--from")
-    faults.require(points in range(2, 201), "points", f"found {points!r}", "2 to 200")
-    wrong = [size for size in excitations if not SMALL <= size <= LARGEST_EXCITATION]
-    words = f"found {wrong[0]:.12g} m" if wrong else "no size"
-    allowed, fine = f"{SMALL:g} to {LARGEST_EXCITATION:g} m", len(excitations) and not wrong
+    whole = isinstance(points, Integral) and points in range(2, 201)
+    faults.require(whole, "points", f"found {points!r}", "a whole number, 2 to 200")
+    inside = [isinstance(a, Real) and SMALL <= float(a) <= LARGEST_EXCITATION for a in excitations]
+    words = "no size" if all(inside) else f"found {excitations[inside.index(False)]} m"
+    allowed, fine = f"{SMALL:g} to {LARGEST_EXCITATION:g} m", len(inside) and all(inside)
     faults.require(fine, "excitations", words, allowed, "--excitation")
     used = "bifurcation" in methods or points == POINTS
     faults.require(used, "points", "has no effect", "only with the method bifurcation")

@@ -70,10 +70,25 @@ def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurca
     assert lowest.speed == pytest.approx(66.69, abs=0.15)
 
 
-@pytest.mark.parametrize("wrong", [4.5, "5", 1, 201])
+@pytest.mark.parametrize("wrong", [4.5, 16.0, "5", 1, 201])
 def test_a_number_of_speeds_that_is_none_is_refused_before_anything_is_computed(wrong):
-    with pytest.raises(railsim.InputError, match=f"points: found {wrong!r}; 2 to 200"):
+    with pytest.raises(railsim.InputError, match=f"points: found {wrong!r}; a whole number, 2"):
         CRITICAL.checked(Contact("tangent", 3e-3, None), ["bifurcation"], 5.0, 120.0, wrong)
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [({"excitations": "3 mm"}, "excitations: found 3 mm m; 1e-05 to 0.02 m"),
+     ({"excitations": 0.1}, "excitations: found 0.1 m; 1e-05 to 0.02 m"),
+     ({"excitations": [1e-3, None]}, "excitations: found None m"),
+     ({"excitations": ()}, "excitations: no size"),
+     ({"conicity": "0.1"}, "conicity: found 0.1; 0.005 to 0.6"),
+     ({"linearisation": "harmonic", "amplitude": "3 mm"}, "amplitude: found 3 mm m; a positive")],
+)  # fmt: skip
+def test_arguments_that_are_no_numbers_are_refused(how, words):
+    """They ended in comparisons of texts with numbers."""
+    with pytest.raises(railsim.InputError, match=words):
+        railsim.critical_speed(load_vehicle("coach_manchester"), methods="ramp", **how)
 
 
 def test_three_quarters_of_a_diagrams_speeds_lie_near_the_linear_critical_speed():
