@@ -13,7 +13,7 @@ import numpy as np
 
 from railsim.errors import ModelError
 from railsim.linear.stability_loss import LossOfStability
-from railsim.stability.branches import Branch, Point
+from railsim.stability.branches import RESOLUTION, Branch, Point
 from railsim.stability.motion import LeftRange, VehicleMotion
 from railsim.stability.periodic import PeriodicMotion, Shooting
 from railsim.stability.vehicle_flow import VehicleFlow
@@ -37,7 +37,7 @@ class Continued:
     """What continuation found."""
 
     branches: list[Branch] = field(default_factory=list)
-    # first motion of the branch that begins where rest loses its stability
+    # of the branch that begins where rest loses its stability the first motion at another speed
     begins: Point | None = None
     # where the branches turn back in speed, stable where one of the two motions beside it is
     folds: list[Point] = field(default_factory=list)
@@ -68,8 +68,9 @@ def followed_branches(
     else:
         born = partial(_birth, motion, lost)
         _follow(found, born, speeds, "the branch of small motions", telling(0), pieces)
-        if found.branches:
-            found.begins = found.branches[0].points[0]
+        for branch in found.branches:
+            away = (p for p in branch.points if abs(p.speed - lost.parameter) > 0.5 * RESOLUTION)
+            found.begins = next(away, branch.points[0])
     tried: list[Sequence[Point]] = []
     for number, piece in enumerate(pieces, start=1):
         tell = telling(number)

@@ -823,6 +823,14 @@ def test_a_branch_is_followed_from_its_birth_through_its_fold_out_of_the_range(m
     assert not found.remarks
 
 
+def test_how_a_branch_begins_is_told_by_the_first_motion_at_another_speed(monkeypatch):
+    """At 59.98 m/s, no more than the speed of birth is known to, both kinds look alike."""
+    found, _ = continued(monkeypatch, Parabola(0.005))
+    assert found.branches[0].points[0].speed == pytest.approx(59.98, abs=1e-4)
+    assert found.begins == found.branches[0].points[2]
+    assert found.begins.speed == pytest.approx(59.94, abs=1e-3)
+
+
 def test_a_branch_ends_where_it_comes_back_to_rest(monkeypatch):
     """As the lower sway of a coach that is stable again from some speed on.
 
