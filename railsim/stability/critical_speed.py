@@ -182,9 +182,9 @@ def checked(
         faults.require(slowest < fastest, "low", f"found {slowest:.12g} m/s", words, "--from")
     whole = isinstance(points, Integral) and points in range(2, 201)
     faults.require(whole, "points", f"found {points!r}", "a whole number, 2 to 200")
-    inside = [isinstance(a, Real) and SMALL <= float(a) <= LARGEST_EXCITATION for a in excitations]
-    words = "no size" if all(inside) else f"found {excitations[inside.index(False)]} m"
-    allowed, fine = f"{SMALL:g} to {LARGEST_EXCITATION:g} m", len(inside) and all(inside)
+    fits = [isinstance(a, Real) and SMALL <= float(a) <= LARGEST_EXCITATION for a in excitations]
+    words = "no size" if all(fits) else f"found {excitations[fits.index(False)]} m"
+    allowed, fine = f"{SMALL:g} to {LARGEST_EXCITATION:g} m", bool(fits) and all(fits)
     faults.require(fine, "excitations", words, allowed, "--excitation")
     used = "bifurcation" in methods or points == POINTS
     faults.require(used, "points", "has no effect", "only with the method bifurcation")
