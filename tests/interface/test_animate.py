@@ -15,9 +15,9 @@ from scipy.interpolate import CubicSpline
 
 import railsim
 from railsim.animation import mode_scene, result_scene, write_movie, write_page
-from railsim.animation.movie import _extent, _polygons, draw
+from railsim.animation.movie import _extent, _polygons, _seen, _shape, draw
 from railsim.animation.page import scene_data
-from railsim.animation.scene import _drawn
+from railsim.animation.scene import Drawn, _drawn
 from railsim.cli import main
 from railsim.cli.animate import _scene
 from railsim.definitions.vehicle.flatten import flatten
@@ -344,6 +344,74 @@ def test_a_moved_body_is_seen_where_it_would_be_if_it_stood_there(result):
         "heading": track["heading"] + angle,
     })  # fmt: skip
     np.testing.assert_allclose(seen(turned), seen(still), atol=1e-9)
+
+
+def test_a_film_looks_down_along_the_track_from_its_right():
+    """Orthogonal, 0.75 rad to the left of the way, 0.3 rad downwards, centred 1.4 m above it.
+
+    By hand: ahead is away and to the right, to the right is nearer, down is down and away.
+    """
+    c, s, down, level = np.cos(0.75), np.sin(0.75), np.sin(0.3), np.cos(0.3)
+    centre = np.array([0.0, 0.0, -1.4])
+    wanted = [(s, -down * c, level * c), (c, down * s, -level * s), (0.0, level, down)]
+    for axis, (x, y, depth) in zip(np.eye(3), wanted, strict=True):
+        for point, size in ((centre, 0.0), (centre + axis, 1.0)):
+            seen, far = _seen(point[None], np.zeros(4))
+            np.testing.assert_allclose(seen, [[size * x, size * y]], atol=1e-15)
+            assert far == pytest.approx(size * depth)
+    # the view moves and turns with the track, whatever its cant
+    there, there_far = _seen(np.array([[3.0, 5.0, -1.4]]), np.array([3.0, 4.0, np.pi / 2.0, 0.1]))
+    np.testing.assert_allclose(there, [[s, -down * c]], atol=1e-15)
+    assert there_far == pytest.approx(level * c)
+
+
+def test_bodies_of_a_film_have_their_sizes():
+    """A wheelset has two rims and an axle 20 mm thick between them, a box six whole faces."""
+    rims = _shape(Drawn("w", "wheelset", 0.0, 0.0, 0.0, (0.46, 0.75, 0.0, 0.0, 0.0, 0.0)))
+    for rim, y in zip(rims, (-0.75, 0.75), strict=False):
+        np.testing.assert_allclose(np.hypot(rim[:, 0], rim[:, 2]), 0.46)
+        np.testing.assert_array_equal(rim[:, 1], y)
+        steps = np.linalg.norm(np.diff(rim, axis=0), axis=1)  # all around, in 24 equal steps
+        np.testing.assert_allclose(steps, 2.0 * 0.46 * np.sin(np.pi / 24.0))
+    np.testing.assert_allclose(np.ptp(rims[2], axis=0), (0.0, 1.5, 0.02))
+    faces = _shape(Drawn("c", "car", 0.0, 0.0, 0.0, (3.0, 2.0, 1.0, 0.3, 0.2, 0.1)))
+    middles = sorted(tuple(np.round(np.mean(face, axis=0), 9).tolist()) for face in faces)
+    out = [np.array([0.3, 0.2, 0.1]) + sign * axis for axis in np.diag([3.0, 2.0, 1.0])
+           for sign in (-1.0, 1.0)]  # fmt: skip
+    assert middles == sorted(tuple(np.round(middle, 9).tolist()) for middle in out)
+    for face in faces:  # its corners in turn: opposite sides are equal
+        np.testing.assert_allclose(face[1] - face[0], face[2] - face[3])
+        assert np.linalg.matrix_rank(face[1:] - face[0], tol=1e-9) == 2
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_section_of_a_film_shows_wheel_rail_and_forces(result, side):
+    """80 mm to both sides of the nominal circle; forces of 1 kN are 0.35 and 0.7 mm long.
+
+    The wheelset is 4 mm aside and rolled by 2 mrad, the rails stand 3 mm further apart.
+    """
+    scene = result_scene(result, frames=2)
+    pose, seats = np.zeros_like(scene.pose), np.zeros_like(scene.seats)
+    pose[..., 1], pose[..., 3] = 0.004, 0.002
+    seats[..., 0], seats[..., 1] = -0.45, 0.003
+    moved = replace(scene, pose=pose, seats=seats)
+    view, *sections = Figure().subplots(1, 3)
+    draw(view, sections, moved, 1)
+    axes, sign, section = sections[side], (-1.0, 1.0)[side], scene.sections[0][side]
+    assert axes.get_xlim() == pytest.approx((sign * 750.0 - 80.0, sign * 750.0 + 80.0))
+    assert axes.get_ylim() == (45.0, -35.0)  # down
+    rail, wheel = (line.get_xydata().T for line in axes.get_lines())
+    np.testing.assert_allclose(rail[0], 1e3 * section["rail_y"] + sign * 1.5)
+    np.testing.assert_allclose(rail[1], 1e3 * section["rail_z"])
+    y, z = 1e3 * section["wheel_y"], 1e3 * section["wheel_z"]
+    np.testing.assert_allclose(wheel, [4.0 + y - 0.002 * z, -450.0 + z + 0.002 * y], atol=1e-9)
+    Q, Y = 1e-3 * scene.Q[1, 0, side], 1e-3 * scene.Y[1, 0, side]
+    assert axes.get_title() == f"{('left', 'right')[side]} wheel 1: Q {Q:.1f} kN, Y {Y:.1f} kN"
+    at = 1e3 * scene.contact[1, 0, side, 1:] + [4.0, -450.0]
+    arrows = [arrow for arrow in axes.texts if arrow.arrow_patch is not None]
+    for arrow, way in zip(arrows, ((0.0, 0.35 * Q), (0.7 * Y, 0.0)), strict=True):
+        np.testing.assert_allclose(arrow.xyann, at)
+        np.testing.assert_allclose(np.subtract(arrow.xy, at), way, atol=1e-9)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
