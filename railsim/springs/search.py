@@ -57,7 +57,8 @@ _ROUNDS, _AROUND, _CLOSER = 8, 32, 0.65  # samples around the best nest of each 
 _DIFFERENCE = 1e-7  # of the scaled dimensions: error of the slopes 1e-7 by cut and by round-off
 _MASS = 50.0  # kg: makes the masses of nests numbers of order one
 _PRICE = 10.0  # of a violation, against aims of order one
-_PROGRAMS, _FIRST_BOX, _CONVERGED = 40, 0.03, 1e-6  # linear programs, over the scaled dimensions
+# linear programs, over the scaled dimensions: many are needed along a curved edge of two limits
+_PROGRAMS, _FIRST_BOX, _CONVERGED = 200, 0.03, 1e-6
 _NEARLY = -2e-3  # slack at which an optimum is good enough to be rounded: rounding decides
 _FAR = -0.5  # slack below which a nest is no compromise
 _SPARE = 10  # pairs refined beyond those asked for: some do not survive rounding

@@ -98,6 +98,32 @@ def test_the_lightest_nest_is_not_missed(unlimited):
     assert result.nests[0].mass <= lightest * 1.002
 
 
+@pytest.mark.slow
+def test_the_optimum_at_the_end_of_a_curved_edge_is_that_of_a_grid():
+    """Both springs are at their yield limits from the start on, and the way is long: with wires of
+    43 and 20 mm the mass still falls by 0.5 % until the inner spring is at its buckling limit."""
+    task = nests.task_of(
+        load_spring("turasas_axlebox", [
+            "search.outer_diameter_max=0.29", "search.inner_diameter_min=0.06",
+            "mounting.deflection=0.070", "target.deflection=0.07462",
+            "search.free_height=[0.32, 0.34]",
+        ])
+    )  # fmt: skip
+    sizes = np.arange(234, 248, 2.0), np.arange(86, 100, 2.0), np.arange(320, 330, 2.0)
+    *D, H0 = (1e-3 * grid.ravel() for grid in np.meshgrid(*sizes))
+    wires = np.array([[0.043], [0.020]])
+    tried = nests.Dimensions(np.repeat(wires, len(H0), axis=1), np.stack(D), H0)
+    found = nests.evaluate(task, tried)
+    lightest = np.min(found.mass[found.feasible])
+    start = nests.Dimensions(wires, np.array([[0.23028], [0.10509]]), np.array([0.33128]))
+    (end,) = springs_search._abreast(task, [springs_search._optimum(task, start, 0)])
+    assert end.worst >= -1e-6
+    assert set(end.active) == {"yield_outer", "yield_inner", "buckling_inner"}
+    # between the points of the grid it may be lighter by what a step is worth, 0.5 %
+    (mass,) = nests.evaluate(task, end.dimensions).mass
+    assert 0.995 * lightest < mass <= lightest
+
+
 def test_it_is_said_that_stresses_are_not_limited(unlimited):
     suspension, result = unlimited
     keys = {remark.key for remark in suspension.unusual()}
