@@ -372,3 +372,12 @@ def test_the_line_of_a_slot_holds_its_pin_at_every_position(motions, lift):
         assert sum(parts) == pytest.approx(length, abs=1e-9)
         assert np.ptp(length) < 1e-9
         assert 0.0 < np.min(parts[0]) == pytest.approx(np.min(parts[1]), abs=1e-9)
+
+
+def test_an_angle_is_that_of_the_first_line_less_that_of_the_second():
+    """With its sign: piston PC against plate BC, whose angle is the driver."""
+    motion = analyse(load_mechanism("tilting_one_spring")).motion
+    x, y = 0.290 * np.cos(motion.s) - 0.176426, 0.290 * np.sin(motion.s) + 0.356766
+    wanted = np.arctan2(y, x) - motion.s
+    assert np.min(wanted) > 0.0
+    np.testing.assert_allclose(motion.angle("mu"), wanted, rtol=1e-12)
