@@ -24,6 +24,7 @@ from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.judgement import Judge
 from railsim.mechanisms.kinematics import derivative, solve, tangents
 from railsim.mechanisms.model import build
+from railsim.mechanisms.tolerance import sensitivities
 
 ALL = (
     "atr95", *(f"atr95_lift_{i}" for i in range(1, 7)),
@@ -381,3 +382,10 @@ def test_an_angle_is_that_of_the_first_line_less_that_of_the_second():
     wanted = np.arctan2(y, x) - motion.s
     assert np.min(wanted) > 0.0
     np.testing.assert_allclose(motion.angle("mu"), wanted, rtol=1e-12)
+
+
+def test_ratios_whose_scatter_is_told_are_height_over_length():
+    """Those of lift 5 at closed, work and end, from closed forms (with the upper links R1)."""
+    found = sensitivities(load_mechanism("atr95_lift_5"), ["a1"])
+    ratios = [found[f"ratio_{at}"][1] for at in ("start", "work", "end")]
+    assert ratios == pytest.approx([32.984, 24.506, 18.474], abs=0.003)
