@@ -9,6 +9,7 @@ from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism.parts import Slot
 from railsim.definitions.mechanism.values import ends, parameter_values
 from railsim.errors import InputError
+from railsim.mechanisms import quantities
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.drawing import lines
 from railsim.mechanisms.dynamics import driven_motion, free_motion
@@ -389,3 +390,13 @@ def test_ratios_whose_scatter_is_told_are_height_over_length():
     found = sensitivities(load_mechanism("atr95_lift_5"), ["a1"])
     ratios = [found[f"ratio_{at}"][1] for at in ("start", "work", "end")]
     assert ratios == pytest.approx([32.984, 24.506, 18.474], abs=0.003)
+
+
+def test_the_travel_is_shown_in_the_unit_of_the_driver():
+    definition = load_mechanism("tilting_one_spring")
+    by_length = definition.driver.model_copy(
+        update={"angle": None, "length": ("ground.P", "plate.C")}
+    )
+    assert quantities.quantity("travel", definition).unit == "deg"
+    moved = definition.model_copy(update={"driver": by_length})
+    assert quantities.quantity("travel", moved).unit == "mm"
