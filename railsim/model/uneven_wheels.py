@@ -16,7 +16,7 @@ from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.definitions.vehicle.out_of_round import Flat, Sections, Uneven
 from railsim.kernels.contact_table import FLANGE, N_PATCH, TREAD
 from railsim.kernels.system import System
-from railsim.kernels.wheel_surface import FIRST, FLAT, N_PHI, N_Y, SURFACE_ROW, WAVE
+from railsim.kernels.wheel_surface import FIRST, FIRST_AHEAD, FLAT, N_PHI, N_Y, SURFACE_ROW, WAVE
 from railsim.model.check_rails import CheckRails
 from railsim.model.rail_ranges import RailRanges
 from railsim.profiles.profile import Profile
@@ -39,14 +39,20 @@ class UnevenWheels(NamedTuple):
         return bool((self.surface_of >= 0).any())
 
     def heights(self, w: int, angle: float) -> Floats:
-        """Return e and e_phi of both treads of wheelset `w` in mid-gauge [m], at an angle."""
+        """Return e and e_phi of both treads of wheelset `w` in mid-gauge [m], at an angle.
+
+        On a flat e_phi is 0: no wheel that runs over one follows it, which would throw it up.
+        """
         found, turn = np.zeros((2, 2)), 2.0 * np.pi
         for side, table in enumerate(self.surface_of[w, :, TREAD]):
             if table >= 0:
-                first, n, n_y = self.surface_row[table, [FIRST, N_PHI, N_Y]].astype(int).tolist()
+                columns = [FIRST, N_PHI, N_Y, FIRST_AHEAD]
+                first, n, n_y, ahead = self.surface_row[table, columns].astype(int).tolist()
                 values = self.surface[first + n_y // 2 : first + n * n_y : n_y, :2]
+                on_flat = self.flat_ahead[ahead + int(angle % turn / turn * n)] == 0.0
                 nodes = np.linspace(0.0, turn, n, endpoint=False)
                 found[side] = [np.interp(angle, nodes, x, period=turn) for x in values.T]
+                found[side, 1] *= not on_flat
         return found
 
     def longest_step(self, speed: float, of_rails: float, *, elastic: bool) -> float:
