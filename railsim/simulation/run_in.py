@@ -9,9 +9,9 @@ rails: the wheelsets would climb or fall.  Therefore the vehicle runs in:
   is the steady state found by Newton's method;
 - on a straight gradient, or where the support of the rails varies, it is in the steady state there,
   by Newton's method;
-- into a transition, a ramp, a vertical curve or a range of changing rail sections over the real
-  track, from the last position before it where the track under the vehicle is uniform, since its
-  state depends on the twist, or the rails, passed;
+- into a transition, a ramp, a vertical curve or a range over which sections, support, friction or
+  check rails change, over the real track, from the last position before it where the track under
+  the vehicle is uniform, since its state depends on the twist, or the rails, passed;
 - onto irregular rails over the last seconds of the real track before the start;
 - where it does not stay on the rails that way, over the whole track from its beginning: so it can
   start wherever a run passes.
@@ -22,6 +22,7 @@ The wheels are round up to there; on wheels that are not, the wheelsets are put 
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -172,17 +173,29 @@ def _friction(track: Track, s: float) -> tuple[float, float]:
 def approach(model: Model, track: Track, start: float, speed: float, step: float) -> int:
     """Steps to run on the real track before the start.
 
-    Irregular rails need a certain time.  A transition, a ramp, a vertical curve or a range of rail
-    sections is entered as in a run over the whole track: from the last position before it where
+    Irregular rails need a certain time.  A transition, a ramp, a vertical curve or a range of
+    `_changing` is entered as in a run over the whole track: from the last position before it where
     curvature, cant, gradient and rails under the whole vehicle are constant.
     """
     system = model.system
     room = start + float(np.min(system.frame_offset)) - system.track.s_start - SMOOTH
-    along = alignment_of(track), model.rails.ends
+    along = alignment_of(track), _changing(model.rails.ends, system.support.variation, track)
     way = _way_from_constant(*along, start, system.frame_offset, room, speed)
     if _displaced(model, start):
         way = max(way, APPROACH_TIME * speed, APPROACH)
     return max(0, math.floor(min(way, room) / (speed * step)))
+
+
+def _changing(sections: Floats, support: Floats, track: Track) -> Floats:
+    """Ranges over which section, support or friction of the rails or check rails change [m].
+
+    `sections`: begin and end of the ranges of sections; `support`: rows of `Support.variation`.
+    """
+    tables = [support, track.friction_table or (), *(rail.rows for rail in track.check_rail)]
+    rows = [pair for table in tables for pair in pairwise(np.asarray(table).tolist())]
+    ranges = [(one[0], two[0]) for one, two in rows if one[1:] != two[1:]]
+    ranges += [(s, s) for rail in track.check_rail for s, _ in (rail.rows[0], rail.rows[-1])]
+    return np.vstack([sections.reshape(-1, 2), np.array(ranges).reshape(-1, 2)])
 
 
 def _displaced(model: Model, start: float) -> bool:

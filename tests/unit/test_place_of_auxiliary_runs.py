@@ -11,7 +11,7 @@ from railsim.definitions import Settings
 from railsim.linear.track_response import track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.observation import Assumed, contact
-from railsim.simulation.run_in import _way_from_constant
+from railsim.simulation.run_in import _changing, _way_from_constant
 from railsim.studies import wear_loop
 from railsim.track.alignment import Alignment
 
@@ -165,3 +165,17 @@ def test_the_way_to_a_start_begins_where_nothing_changes_under_the_vehicle(kind,
     found = _way_from_constant(Alignment(track), ranges.reshape(-1, 2), start, axles, room, 10.0)
     assert found == pytest.approx(way, abs=0.51)
     assert (found > 0.0) == (way > 0.0)
+
+
+def test_support_friction_and_check_rails_change_between_their_unequal_rows():
+    """Where a check rail begins and ends it changes at once."""
+    rows = np.array([[0.0, 1.0, 1.0], [40.0, 1.0, 1.0], [45.0, 1.0, 3.0], [60.0, 1.0, 3.0]])
+    track = railsim.load_track("straight").replace(
+        friction_table=[[10.0, 0.4, 0.4], [12.0, 0.4, 0.1], [90.0, 0.4, 0.1]],
+        check_rail=[{"rail": "left", "flangeway": [[50.0, 0.06], [52.0, 0.04], [70.0, 0.04]]}],
+    )
+    found = _changing(np.array([[80.0, 83.0]]), rows, track)
+    expected = [(10.0, 12.0), (40.0, 45.0), (50.0, 50.0), (50.0, 52.0), (70.0, 70.0), (80.0, 83.0)]
+    assert sorted(map(tuple, found.tolist())) == expected
+    plain = railsim.load_track("straight")
+    assert _changing(np.zeros((0, 2)), np.zeros((0, 3)), plain).shape == (0, 2)

@@ -195,6 +195,29 @@ def test_rails_are_supported_as_at_the_start_between_two_rows():
     np.testing.assert_allclose(varying.Q, alike.Q, atol=5e3)
 
 
+@pytest.mark.parametrize(
+    "changing",
+    [
+        {"support": {"variation": [[0.0, 1.0], [195.0, 1.0], [205.0, 5.0]]}},
+        {"friction_table": [[0.0, 0.4], [180.0, 0.4], [195.0, 0.1]]},
+    ],
+)
+def test_a_start_where_support_or_friction_changes_is_that_of_a_run_from_before(changing):
+    """In Q and Y within 1 % of the wheel load, the vehicle standing on both sides of the change."""
+    track = curve("elastic", 400.0).replace(**changing)
+    coach, settings = railsim.load_vehicle("coach_manchester"), STEADY
+    before, there = (
+        railsim.simulate(coach, track, speed=SPEED, start=start, until=202.0, settings=settings)
+        for start in (150.0, 200.0)
+    )
+    for name in ("Q", "Y"):
+        forces = before[name].reshape(len(before.time), -1).T
+        passed = np.array([np.interp(there.distance, before.distance, row) for row in forces]).T
+        np.testing.assert_allclose(
+            there[name].reshape(passed.shape), passed, atol=0.01 * there.Q0.mean()
+        )
+
+
 @pytest.mark.parametrize("rows", [[[0.0, 0.3]], [[0.0, 1.0], [90.0, 1.0], [110.0, 0.5]]])
 def test_on_straight_track_wheels_begin_on_the_rails_as_they_are_supported(rows):
     """Softer rails are pressed down further: nothing drops onto them when the run begins."""
