@@ -252,6 +252,7 @@ def _frames(model: Model, s: float) -> Floats:
 def follow_rails(model: Model, state: Floats) -> None:
     """Put the wheelsets on irregular rails, moving as the rails lead them."""
     speed, n = state[SPEED], model.index.n_bodies
+    before = state.copy()
     plane = _located(model, float(state[ARC_LENGTH])).plane
     for w, body in enumerate(model.system.contact.body):
         first, rate = 6 * body, velocity_begin(n) + 6 * body
@@ -264,6 +265,25 @@ def follow_rails(model: Model, state: Floats) -> None:
         state[rate + 1] += speed * (plane[w, SLOPE_Y] - height * plane[w, ROLL_SLOPE])
         state[rate + 2] += speed * plane[w, SLOPE_Z]
         state[rate + 3] += speed * plane[w, ROLL_SLOPE]
+    _turn_arms(model, state, state - before)
+
+
+def _turn_arms(model: Model, state: Floats, moved: Floats) -> None:
+    """Turn the arms of axleboxes so that their springs give way least to what `moved` wheelsets.
+
+    With the points (x, y) and vertical stiffnesses k of an arm's springs, counted from the middle
+    of the axle, the pitch is sum k x (z + y roll) / sum k x^2: a stiff bush stays where it is.
+    """
+    bodies, mounts, n = model.system.bodies, model.system.mounts, model.index.n_bodies
+    for arm in bodies.axleboxes:
+        own = mounts.body == arm
+        k = np.broadcast_to(mounts.stiffness[:, 2:], own.shape)[own]
+        x, y, _ = mounts.point[own].T
+        if not k @ x**2:
+            continue
+        for first in (0, velocity_begin(n)):
+            z, roll = moved[first + 6 * bodies.parent[arm] + np.array([2, 3])]
+            state[first + 6 * arm + 4] += k @ (x * (z + y * roll)) / (k @ x**2)
 
 
 def follow_wheels(model: Model, state: Floats, base: float) -> None:

@@ -218,6 +218,28 @@ def test_a_start_where_support_or_friction_changes_is_that_of_a_run_from_before(
         )
 
 
+def test_arms_turn_about_their_bushes_where_wheelsets_are_put_on_irregular_rails():
+    """The end of the arm, x ahead of the axle and y beside it, stays at its height and at rest."""
+    rough = {"type": "random", "spectrum": "erri_b176_high", "seed": 3, "fade": 0.0}
+    track = railsim.load_track("straight").replace(irregularities=[rough])
+    balance = equilibrium(
+        assemble(railsim.load_vehicle("coach_flexicoil"), track, Settings()), SPEED
+    )
+    model, state = balance.model, balance.state.copy()
+    state[-2] = 100.0
+    run_in.follow_rails(model, state)
+    moved = (state - balance.state)[: 12 * model.index.n_bodies].reshape(2, -1, 6)  # and rates
+    for name, axle in zip(model.index.bodies, model.system.bodies.parent, strict=True):
+        if axle < 0:
+            continue
+        x = 0.4 if ("inner" in name) == name.startswith("front") else -0.4
+        y = 1.0 if name.endswith("right") else -1.0
+        pitch = moved[:, model.index.bodies.index(name), 4]
+        z, roll = moved[:, axle, 2], moved[:, axle, 3]
+        assert np.abs(z[0]) > 1e-4
+        np.testing.assert_allclose(x * pitch, z + y * roll, rtol=1e-2)  # the nest gives way too
+
+
 @pytest.mark.parametrize("rows", [[[0.0, 0.3]], [[0.0, 1.0], [90.0, 1.0], [110.0, 0.5]]])
 def test_on_straight_track_wheels_begin_on_the_rails_as_they_are_supported(rows):
     """Softer rails are pressed down further: nothing drops onto them when the run begins."""
