@@ -106,7 +106,7 @@ class StepChoice:
         if self._settings.output_spacing is not None:
             interval = duration(self._settings.output_spacing, speed, rate)
         key = class_speed(speed) if self.varies else speed
-        longest = self._known.get(key) or self._choose(key, interval)
+        longest = self._known.get(key) or self._choose(key, self._settings.output_interval(key))
         self._known[key] = longest
         if self._settings.step is None:
             elastic = bool(self._model.system.support.elastic)

@@ -77,6 +77,24 @@ def test_a_run_that_brakes_has_a_step_until_the_loop_finds_it_at_a_standstill():
     assert steps.at(0.0497) == steps.at(0.051)
 
 
+def test_step_of_a_class_is_the_same_wherever_a_run_of_changing_speed_enters_it(monkeypatch):
+    """Outputs every 0.25 m are 13.9 to 15.6 ms apart; a run that is continued begins anywhere."""
+
+    def longest(self, speed, interval):
+        return interval / math.ceil(interval / 2.1e-3)
+
+    monkeypatch.setattr(step_choice.StepChoice, "_choose", longest)
+    settings = Settings(
+        drive={"mode": "table", "speed_table": [[0.0, 18.0], [300.0, 16.0]]}, output_spacing=0.25
+    )
+    found = []
+    for first in (18.0, 17.5, 17.01, 16.0):
+        vehicle, track = load_vehicle("coach_manchester"), load_track("straight")
+        steps = prepare(vehicle, track, settings, first, duration=1.0).steps
+        found.append(steps.at(17.4)[1])
+    assert found == 4 * [8]
+
+
 def test_dry_friction_is_followed_in_short_steps():
     """Stable at 2.5 ms, where sum_Y in R 250 m is off by 3.8 % from RK4; here 1 %."""
     vehicle, track = load_vehicle("wagon_uic_link_empty"), load_track("straight")
