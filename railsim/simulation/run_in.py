@@ -292,7 +292,7 @@ def follow_wheels(model: Model, state: Floats, base: float) -> None:
     z = -(e_l + e_r)/2 and roll = -(e_r - e_l)/`base` [m] about the rails, e and its rate e_phi V/r0
     as in `railsim.kernels.wheel_surface`.
     """
-    system, n = model.system, model.index.n_bodies
+    system, n, before = model.system, model.index.n_bodies, state.copy()
     for w, body in enumerate(system.contact.body):
         radius, first = system.bodies.row[body, RADIUS], 6 * body
         s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[body]]
@@ -303,6 +303,7 @@ def follow_wheels(model: Model, state: Floats, base: float) -> None:
             state[at + 1] -= system.bodies.nominal[body, 1] * roll
             state[at + 2] -= 0.5 * (left + right)
             state[at + 3] += roll
+    _turn_arms(model, state, state - before)
 
 
 def _run(
