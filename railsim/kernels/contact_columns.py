@@ -41,13 +41,14 @@
     SLOPE_ALONG,
     SLOPE_ACROSS,
     SECANT_ALONG,
+    SLOPE_CROSS,
     RISE,
     FORCE_PER_Y,
     FORCE_PER_Z,
     FORCE_PER_ROLL,
     TURNING,
-) = range(40)
-PATCH_ROWS = 40
+) = range(41)
+PATCH_ROWS = 41
 
 # columns of Work.wheel[w, side]; creepages, normal force and position of the most loaded patch;
 # force of check rails and its wear number
@@ -72,9 +73,12 @@ WHEEL_COLUMNS = 13
 # implicit part of the step: slopes of the creep forces along the track, their secants [N s/m], the
 # latter times the lever c_z [N s], in yaw [N m s]; then in y, z and roll [N s/m, N s, N m s] the
 # upper half of the symmetric matrix of the creep forces across, and row by row that of the normal
-# forces with the friction that follows them
+# forces with the friction that follows them; at walking pace the secants times c_y [N s], by the
+# slopes of the creep force in one direction over the slip in the other what the slip along takes
+# from the speeds in y, z and roll, and that times c_y
 J_ALONG, J_SECANT, J_SECANT_LEVER, J_SECANT_YAW, J_SLIP, J_NORMAL = 0, 1, 2, 3, 4, 10
-CONTACT_JACOBIAN = 19
+J_SECANT_ASIDE, J_CROSS, J_CROSS_YAW = 19, 20, 23
+CONTACT_JACOBIAN = 26
 
 # columns of Work.bump, of each patch of the wheel at hand: e [m], its rate [m/s], e_phi [m], e_y
 # [1], change of the rate over `AHEAD` [m/s]; what is added to the radius [m]; where a rail's

@@ -13,7 +13,10 @@ from railsim.kernels.contact_columns import (
     FORCE_PER_ROLL,
     FORCE_PER_Y,
     FORCE_PER_Z,
+    J_CROSS,
+    J_CROSS_YAW,
     J_NORMAL,
+    J_SECANT_ASIDE,
     J_SLIP,
     NORMAL,
     NORMAL_DAMPING,
@@ -47,6 +50,12 @@ from railsim.kernels.support import (
     K,
 )
 
+# m/s, speed of travel below which the implicit part knows how creep forces in one direction follow
+# the slip in the others: without, steps in tight curves had to be up to thirty times as short
+WALKING = 3.0
+# there the slope across is this share of the force over the slip at least: spin turns the force of
+# a patch that slides, which the slopes do not know
+LEAST_ACROSS = 0.2
 # static wheel loads up to which the gradients of the table count in full, to nothing at twice that
 HEAVY = 4.0
 # by how much a patch's change of stiffness may change its force, over its stiffness against the
@@ -55,7 +64,7 @@ LEAST, MOST = 0.03, 0.5
 
 
 @compiled(python=False)
-def creep_slopes(n, patches, speed, G, along, across, secant_along):
+def creep_slopes(n, patches, speed, G, along, across, secant_along, cross):
     """Slopes of the creep force along and across over the slip in that direction [N s/m].
 
     Those of the force mu N (1 - (1 - u/3)^3) in the direction of the linear one, u = |T_linear|/
@@ -70,8 +79,9 @@ def creep_slopes(n, patches, speed, G, along, across, secant_along):
         Read only.
     speed, G : float
         Speed of travel [m/s]; shear modulus, reduced by the third body [Pa].
-    along, across, secant_along : float64[>= n, by eights]
-        Written; zero without friction or load.  `secant_along`: the force along over the slip.
+    along, across, secant_along, cross : float64[>= n, by eights]
+        Written; zero without friction or load.  `secant_along`: the force along over the slip;
+        `cross`: slope of the force in one direction over the slip in the other one.
     """
     a, b, mu_N = patches.a, patches.b, patches.mu_N
     c11, c22, c23 = patches.c11, patches.c22, patches.c23
@@ -90,11 +100,12 @@ def creep_slopes(n, patches, speed, G, along, across, secant_along):
         left = one - u * (1.0 / 3.0)
         secant = where_beyond(u, 3.0, one / u, left + square * (1.0 / 27.0))
         tangent = where_beyond(u, 3.0, zero, left * left)
-        share = x * x / (square + 1e-300)
+        share, both = x * x / (square + 1e-300), x * y / (square + 1e-300)
         scale = where_beyond(load, 0.0, unit * per_speed, zero)
         store_lanes(along, i, scale * k11 * (secant + share * (tangent - secant)))
         store_lanes(across, i, scale * k22 * (tangent + share * (secant - tangent)))
         store_lanes(secant_along, i, scale * k11 * secant)
+        store_lanes(cross, i, scale * (0.5 * (k11 + k22)) * both * (tangent - secant))
 
 
 @compiled(python=False)
@@ -234,3 +245,19 @@ def add_damping(work, b, k, across, damping):
     add_to_row(row, J_NORMAL, damping * (s + share * c), normal)
     add_to_row(row, J_NORMAL + 3, damping * (c - share * s), normal)
     add_to_row(row, J_NORMAL + 6, damping * (lever + share * arm), normal)
+
+
+@compiled(python=False)
+def add_coupling(work, b, k, secant, cross):
+    """Add how patch `k` couples the speeds along the track, in yaw, and in y, z and roll.
+
+    Slips of the wheel along, x' + c_z pitch' - c_y yaw', and across, c y' - s z' + arm roll', with
+    the slopes `secant` of the force along over the former and `cross` over the other one.
+    """
+    row, patch = work.contact_jacobian[b], work.patch
+    s, c = patch[NORMAL_Y, k], patch[NORMAL_Z, k]
+    cy = patch[C_Y, k]
+    across = c, -s, -c * patch[C_Z, k] - s * cy
+    row[J_SECANT_ASIDE] += secant * cy
+    add_to_row(row, J_CROSS, cross, across)
+    add_to_row(row, J_CROSS_YAW, cross * cy, across)

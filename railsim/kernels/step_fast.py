@@ -6,12 +6,18 @@ elements advanced exactly for the drive in the middle of the step (see `internal
 smoothed accelerations and the last drives.  Elastic rails: see `support_step`.
 """
 
+from math import sqrt
+
 from railsim.kernels import compiled
 from railsim.kernels.actuators import ACTION, AXLE
+from railsim.kernels.branches import rarely
 from railsim.kernels.contact_columns import (
     J_ALONG,
+    J_CROSS,
+    J_CROSS_YAW,
     J_NORMAL,
     J_SECANT,
+    J_SECANT_ASIDE,
     J_SECANT_LEVER,
     J_SECANT_YAW,
     J_SLIP,
@@ -133,7 +139,63 @@ def soften_across(jacobian, b, rate, before, v, mass, roll, h):
 
 
 @compiled(python=False)
-def soften_contact(bodies, jacobian, b, rate, before, h, last):
+def soften_coupled(bodies, work, b, rate, before, along, step, last):
+    """Take what the contact takes from the slip along, in yaw, y, z and roll implicit at once.
+
+    At walking pace all of these are too fast to be followed, and wheelsets that slide in tight
+    curves couple them: the largest eigenvalue of the whole matrix over that of its blocks may be
+    as large as their number, and steps are stable up to some 3/2 of what the implicit part takes.
+    `along`, `step`, `last`: see `soften_contact`.  `Work.coupled` holds the matrix, the right-hand
+    side, inverse masses and roots of the implicit shares.
+    """
+    n, x, w, s = 5, 5, 6, 7
+    J, m, v, row = work.contact_jacobian[b], work.coupled, 6 * b, bodies.row[b]
+    lever, share = J[J_SECANT_LEVER] / J[J_SECANT], along / J[J_SECANT]
+    mass, turning = 1.0 / row[MASS], 1.0 / row[I_2]
+    m[0, w], m[1, w], m[4, w] = mass + lever * lever * turning, 1.0 / row[I_3], 1.0 / row[I_1]
+    m[2, w] = m[3, w] = mass
+    m[0, 0], m[1, 1], m[1, 0] = along, share * J[J_SECANT_YAW], -share * J[J_SECANT_ASIDE]
+    slip = m[0, x] = rate[v] - before[v] + lever * (rate[v + 4] - before[v + 4])
+    m[1, x] = rate[v + 5] - before[v + 5]
+    for i in range(3):
+        m[2 + i, x] = rate[v + 1 + i] - before[v + 1 + i]
+        m[2 + i, 0], m[2 + i, 1] = J[J_CROSS + i], -J[J_CROSS_YAW + i]
+        for j in range(i + 1):
+            m[2 + i, 2 + j] = J[J_SLIP + (i if j == 0 else i + j + 1)]
+    z = last * (m[2, 2] * mass + m[3, 3] * mass + m[4, 4] * m[4, w])
+    m[0, s] = sqrt(step * implicitness(step * along * m[0, w]))
+    m[1, s] = sqrt(last * implicitness(last * m[1, 1] * m[1, w]))
+    m[2, s] = m[3, s] = m[4, s] = sqrt(last * implicitness(z))
+    for i in range(n):
+        for j in range(i + 1):
+            m[i, j] *= m[i, s] * m[j, s]
+            m[j, i] = m[i, j]
+    for i in range(3):
+        for j in range(3):
+            m[2 + i, 2 + j] += 0.5 * last * J[J_NORMAL + 3 * i + j]
+    for i in range(n):
+        for j in range(n):
+            m[i, j] *= m[i, w]
+        m[i, i] += 1.0
+    for k in range(n):  # far from singular: no pivots are needed
+        for i in range(k + 1, n):
+            f = m[i, k] / m[k, k]
+            for j in range(k + 1, x + 1):
+                m[i, j] -= f * m[k, j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            m[i, x] -= m[i, j] * m[j, x]
+        m[i, x] /= m[i, i]
+    force = (slip - m[0, x]) / m[0, w]
+    rate[v] -= force * mass
+    rate[v + 4] -= force * lever * turning
+    rate[v + 5] = before[v + 5] + m[1, x]
+    for i in range(3):
+        rate[v + 1 + i] = before[v + 1 + i] + m[2 + i, x]
+
+
+@compiled(python=False)
+def soften_contact(bodies, work, b, rate, before, h, last):
     """Take the damping of wheelset `b` by its contacts linearly implicit over a step `h`.
 
     The explicit acceleration a is evaluated with the extrapolated velocity; the acceleration a_n of
@@ -144,13 +206,16 @@ def soften_contact(bodies, jacobian, b, rate, before, h, last):
     step over which the velocity was extrapolated, `last`; for the spin, which a longer step than
     that would not follow, the longer one.
     """
-    v = 6 * b
+    v, jacobian = 6 * b, work.contact_jacobian
     mass, turning = 1.0 / bodies.row[b, MASS], 1.0 / bodies.row[b, I_2]
     secant, step = jacobian[b, J_SECANT], max(last, h)
     if secant > 0.0:
         lever = jacobian[b, J_SECANT_LEVER] / secant
         z = step * secant * (mass + lever * lever * turning)
         along = max(jacobian[b, J_ALONG], min(1.0, SECANT - 1.0 / z) * secant)
+        if rarely(jacobian[b, J_SECANT_ASIDE] != 0.0):
+            soften_coupled(bodies, work, b, rate, before, along, step, last)
+            return
         soften_slip(rate, before, v, v + 4, lever, along, mass, turning, step)
         yaw = jacobian[b, J_SECANT_YAW] * along / secant
         soften(rate, before, v + 5, yaw, 1.0 / bodies.row[b, I_3], last)
@@ -169,7 +234,7 @@ def remember(system, work, state, derivative, h):
         place_on_rails(system, work, state, before)
     for b in range(n):
         if system.bodies.kind[b] == WHEELSET:
-            soften_contact(system.bodies, work.contact_jacobian, b, rate, before, h, h)
+            soften_contact(system.bodies, work, b, rate, before, h, h)
     for k in range(6 * n):
         before[k] = rate[k]
     for i in range(m):
@@ -244,7 +309,7 @@ def step_fast(system, work, state, derivative, decay, h):
             aside = UNSMOOTHED if kind == WHEELSET else OF_BODIES
             beta = spin = SMOOTHING if kind == WHEELSET else OF_BODIES
         if kind == WHEELSET:
-            soften_contact(bodies, work.contact_jacobian, b, rate, before, h, last)
+            soften_contact(bodies, work, b, rate, before, h, last)
             for e in range(system.drives.body.shape[0]):
                 if system.drives.body[e, 1] == b:
                     spin = SMOOTHING

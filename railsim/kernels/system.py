@@ -393,6 +393,7 @@ class Work(NamedTuple):
     laws : float64[LAWS_SIZE]   of the elements at hand, see `elements`
     decay : float64[m]          see `internal.constant_decays`
     contact_jacobian : float64[n, CONTACT_JACOBIAN]  see `wheel_rail`
+    coupled : float64[5, 8]     see `step_fast.soften_coupled`
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE];
     rail_motion : float64[w, 2, MOTION_SIZE]   the rails under each wheelset, see `rails`
     rail_cell : int64[w];  rail_u : float64[w]   where in the track's tables they are
@@ -437,6 +438,7 @@ class Work(NamedTuple):
     laws: np.ndarray
     decay: np.ndarray
     contact_jacobian: np.ndarray
+    coupled: np.ndarray
     plane: np.ndarray
     rail: np.ndarray
     rail_motion: np.ndarray

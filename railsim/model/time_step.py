@@ -17,6 +17,7 @@ from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError
 from railsim.kernels.compiler import entry
 from railsim.kernels.contact_columns import PATCH_ROWS, WHEEL_COLUMNS
+from railsim.kernels.contact_damping import WALKING
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.internal import PAD
@@ -251,6 +252,8 @@ class Stability:
         if self._within(0, *self._straight, interval / n):
             names = " on ".join(profile.name for profile in self._model.profiles.values())
             cause = f"the contact of {names} is too sharp in flange contact"
+            if (speed := self._straight[1][SPEED]) < WALKING:
+                cause += f", or {speed:g} m/s too slow, with creep forces that stiffen as 1/speed"
         raise ModelError(f"no stable step longer than {SHORTEST_STEP:g} s: {cause}")
 
     def holds_on_straight(self, h: float, margin: float = 1.0) -> bool:

@@ -65,6 +65,7 @@ def work_arrays(system: kernel.System) -> kernel.Work:
         laws=aligned_zeros(LAWS_SIZE),
         decay=aligned_zeros(len(system.internal.kind)),
         contact_jacobian=aligned_zeros((n, CONTACT_JACOBIAN)),
+        coupled=aligned_zeros((5, 8)),
         plane=smooth_planes(n_wheelsets),
         rail=aligned_zeros((n_wheelsets, 2, RAIL_SIZE)),
         rail_motion=aligned_zeros((n_wheelsets, 2, MOTION_SIZE)),

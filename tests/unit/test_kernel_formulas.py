@@ -13,6 +13,7 @@ from scipy.signal import butter
 from scipy.spatial.transform import Rotation
 
 from railsim.kernels import (
+    contact_damping,
     contact_table,
     controllers,
     creepages,
@@ -42,6 +43,9 @@ from railsim.kernels.contact_columns import (
     FOOT_Y,
     FOOT_Z,
     J_NORMAL,
+    J_SECANT,
+    J_SECANT_LEVER,
+    J_SECANT_YAW,
     J_SLIP,
     NORMAL_Y,
     NORMAL_Z,
@@ -49,6 +53,7 @@ from railsim.kernels.contact_columns import (
     PATCH_SPEED,
     PHI,
     RISE,
+    T_Y,
     TURN_Y,
     TURN_Z,
     XI_X,
@@ -73,6 +78,10 @@ from railsim.kernels.system import (
     COS_ROLL,
     FORCE,
     FREE,
+    I_1,
+    I_2,
+    I_3,
+    MASS,
     MOMENT,
     POSE_SIZE,
     RADIUS,
@@ -308,6 +317,47 @@ def test_implicit_damping_of_a_step_solves_its_matrix(h, plain):
     step_fast.soften_slip(found, before, 2, 4, lever[1], damping, mass, roll, h)
     expected = before[[2, 4]] + np.linalg.solve(matrix, (given - before)[[2, 4]])
     assert found[[2, 4]] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("h", [1e-3, 3.0])
+def test_implicit_damping_at_walking_pace_solves_the_matrix_of_all_directions(h, plain):
+    """(1 + h M^-1 D) (a_n - b) = a - b with D = sum G^T S G over the patches, G of two slips.
+
+    Along, x' + c_z pitch' - c_y yaw'; across, c y' - s z' + arm roll'; S has the slopes of the
+    force over both, E in the corners.  What the normal forces take goes to a half.
+    """
+    random = np.random.default_rng(11)
+    plain(step_fast)
+    plain(contact_damping)
+    patch, cz, angle = random.uniform(0.2, 1.0, (PATCH_ROWS, 2)), 0.45, np.array([0.02, -1.1])
+    patch[C_Z], patch[C_Y], patch[T_Y] = cz, [0.75, -0.75], 0.0
+    patch[NORMAL_Y], patch[NORMAL_Z] = np.sin(angle), np.cos(angle)
+    work = Record(patch=patch, coupled=np.zeros((5, 8)))
+    work.contact_jacobian = np.zeros((2, CONTACT_JACOBIAN))
+    D, N, J = np.zeros((6, 6)), np.zeros((6, 6)), work.contact_jacobian[1]
+    for k, (secant, across, cross, damping) in enumerate(random.uniform(0.5, 1.5, (2, 4))):
+        contact_damping.add_damping(work, 1, k, across, damping)
+        contact_damping.add_coupling(work, 1, k, secant, 0.3 * cross)
+        J[[J_SECANT, J_SECANT_LEVER]] += secant, secant * cz
+        J[J_SECANT_YAW] += secant * patch[C_Y, k] ** 2
+        s, c, cy = np.sin(angle[k]), np.cos(angle[k]), patch[C_Y, k]
+        G = np.array([[1, 0, 0, 0, cz, -cy], [0, c, -s, -c * cz - s * cy, 0, 0]])
+        D += G.T @ np.array([[secant, 0.3 * cross], [0.3 * cross, across]]) @ G
+        normal = np.array([0, s, c, c * cy - s * cz, 0, 0])
+        N += damping * np.outer(normal, normal)
+    row = np.zeros((2, 8))
+    row[1, [MASS, I_1, I_2, I_3]] = 1.4, 0.7, 0.3, 0.9
+    inverse = 1.0 / np.array([1.4, 1.4, 1.4, 0.7, 0.3, 0.9])
+    z = h * inverse * np.diag(D)
+    theta = np.zeros(6)
+    theta[[0, 4]] = step_fast.implicitness(z[0] + z[4])
+    theta[1:4], theta[5] = step_fast.implicitness(z[1:4].sum()), step_fast.implicitness(z[5])
+    before, given = random.normal(size=(2, 12))
+    matrix = np.eye(6) + h * inverse[:, None] * (np.sqrt(np.outer(theta, theta)) * D + 0.5 * N)
+    expected = before[6:] + np.linalg.solve(matrix, (given - before)[6:])
+    found = given.copy()
+    step_fast.soften_coupled(Record(row=row), work, 1, found, before, J[J_SECANT], h, h)
+    assert found == pytest.approx([*given[:6], *expected])
 
 
 @pytest.mark.parametrize("roll", [0.0, 0.004, 0.02, -0.05])

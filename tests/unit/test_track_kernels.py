@@ -181,7 +181,10 @@ def creep_force(xi, G, a, b, mu_N, c11, c22, c23, phi):
 
 
 def test_slopes_of_the_creep_force_are_its_derivatives(plain):
-    """Over the slip along and across; eight patches of other loads, one of which slides."""
+    """Over the slip along and across; eight patches of other loads, one of which slides.
+
+    Last the mean of both slopes in one direction over the slip in the other one.
+    """
     random, G, speed = np.random.default_rng(5), 8e10, 20.0
     a, b = random.uniform(2e-3, 6e-3, (2, LANES))
     c11, c22, c23 = random.uniform([[4.0], [3.0], [1.0]], [[5.0], [4.0], [2.0]], (3, LANES))
@@ -191,14 +194,15 @@ def test_slopes_of_the_creep_force_are_its_derivatives(plain):
     patches = Record(
         a=a, b=b, mu_N=mu_N, c11=c11, c22=c22, c23=c23, xi_x=xi[0], xi_y=xi[1], phi=phi
     )
-    found = np.zeros((3, LANES))
+    found = np.zeros((4, LANES))
     plain(contact_damping)
     contact_damping.creep_slopes(LANES, patches, speed, G, *found)
     for k in range(LANES):
         given = G, a[k], b[k], mu_N[k], c11[k], c22[k], c23[k], phi[k]
-        slopes = np.diag(approx_fprime(xi[:, k], lambda x, g=given: creep_force(x, *g), 1e-9))
+        slopes = approx_fprime(xi[:, k], lambda x, g=given: creep_force(x, *g), 1e-9)
         secant = creep_force(xi[:, k], *given)[0] / xi[0, k]
-        assert speed * found[:, k] == pytest.approx([*slopes, secant], rel=1e-4, abs=1.0)
+        expected = [*np.diag(slopes), secant, 0.5 * (slopes[0, 1] + slopes[1, 0])]
+        assert speed * found[:, k] == pytest.approx(expected, rel=1e-4, abs=3.0)
 
 
 def test_slopes_of_followed_creepages_are_those_of_what_the_step_takes_up(plain):

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from step_halving import changes, half_as_long, irregular_run
 
+from railsim.definitions.loading import load_settings, load_track, load_vehicle
+from railsim.simulation import simulate
+
 CASES = [(60.0, 1000.0), (3.0, 150.0)]
 
 
@@ -31,3 +34,20 @@ def test_run_is_lively(runs):
     full, _ = runs
     assert np.max(np.abs(full.wheelset_lateral)) > 2.5e-3
     assert np.max(np.abs(full.dQ_over_Q0)) > 0.05
+
+
+@pytest.mark.further
+def test_walking_pace_in_a_tight_curve_needs_no_shorter_steps():
+    """R 150 m at 0.5 m/s: the creep forces of all directions are implicit at once, see `step_fast`.
+
+    By blocks, no step was stable: spin turns the force of a flange that slides.
+    """
+    wagon, track = load_vehicle("wagon_c62a"), load_track("s_curve_r150")
+    runs = [
+        simulate(wagon, track, speed=0.5, start=60.0, duration=1.0, settings=settings)
+        for settings in (load_settings(), load_settings().replace(step=1e-4))
+    ]
+    assert runs[0].attributes["step"] > 5e-4
+    for name in ("Q", "Y"):
+        chosen, short = (run[name] for run in runs)
+        assert chosen == pytest.approx(short, abs=2e-3 * runs[0]["Q0"].max()), name
