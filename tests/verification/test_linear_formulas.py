@@ -6,13 +6,22 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from railsim.kernels.system import RIGID, WHEELSET
 from railsim.linear.coordinates import Coordinates
 from railsim.linear.eigenmodes import Eigenmodes, eigenmodes, oscillations, pairing
-from railsim.linear.naming import Parts, mode_name
+from railsim.linear.naming import Parts, mode_name, parts_of
 from railsim.linear.system import Linearisation, jacobian, without_forceless
-from railsim.linear.track_response import RAILS, TrackResponse, _forces_of, _of_wheelsets, _power
+from railsim.linear.track_response import (
+    RAILS,
+    TrackResponse,
+    _forces_of,
+    _of_wheelsets,
+    _power,
+    _readings,
+)
+from railsim.result.sensors import Sensor
 from railsim.stability.branches import Branch, Point, first_beyond, jumps, lowest_of
 from railsim.stability.motion import Stretch
 
@@ -163,7 +172,49 @@ def test_forces_on_the_rails_of_unknown_accelerations_balance_two_wheelsets():
         assert moment == pytest.approx(roll[b] * d[2])
 
 
+@pytest.mark.parametrize("axlebox", [False, True])
+def test_accelerometers_read_motion_and_the_gravity_of_their_tilt(axlebox):
+    """a + alpha x arm - g in the tilted axes of a body, z down; an axlebox does not pitch."""
+    random = np.random.default_rng(5)
+    arm, n = random.normal(size=3), 12
+    places = {(1, k): k for k in range(6)}
+    velocities = {(1, k): 6 + k for k in range(6)}
+    free = SimpleNamespace(
+        model=SimpleNamespace(index=SimpleNamespace(bodies=("other", "body"))),
+        coordinates=SimpleNamespace(position_of=places, velocity_of=velocities),
+    )
+    C, R, names = _readings({"here": Sensor("body", 0.0, tuple(arm), axlebox)}, free, n)
+    assert names == ["here.x", "here.y", "here.z", "here.roll_rate"]
+    tilt = 1e-5 * random.normal(size=3)
+    state, rate = np.zeros(n), random.normal(size=n)
+    state[3:6], state[9:] = tilt, random.normal(size=3)
+    turning = rate[9:] * [1.0, not axlebox, 1.0]
+    axes = Rotation.from_rotvec(tilt * [1.0, not axlebox, 1.0])
+    gravity = axes.inv().apply([0.0, 0.0, 9.81]) - [0.0, 0.0, 9.81]
+    expected = rate[6:9] + np.cross(turning, arm) - gravity
+    assert (C @ state + R @ rate)[:3] == pytest.approx(expected, abs=1e-8)
+    assert (C @ state + R @ rate)[3] == pytest.approx(state[9])
+
+
 # names ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("second", "cars"), [(4.9, (0,)), (5.1, ()), (10.0, ())])
+def test_without_bogies_what_is_half_as_heavy_as_the_heaviest_is_its_equal(second, cars):
+    """Bodies on wheelsets alone: a car and a part of it, or two bogies without a car."""
+    kinds, masses = np.array([RIGID, RIGID, WHEELSET, WHEELSET]), np.array([10.0, second, 1.5, 1.5])
+    pairs = np.array([[0, 2], [3, 0], [1, 2], [3, 1]])
+    system = SimpleNamespace(
+        bodies=SimpleNamespace(kind=kinds, mass=masses),
+        links=SimpleNamespace(body=pairs[:3]),
+        mounts=SimpleNamespace(body=pairs[3:]),
+        contact=SimpleNamespace(body=np.array([2, 3])),
+    )
+    found = parts_of(SimpleNamespace(system=system), None)
+    assert found.cars == cars
+    assert found.frames == tuple(b for b in (0, 1) if b not in cars)
+    assert found.wheelsets == (2, 3)
+
 
 BODIES = ("carbody", "front.frame", "rear.frame", "front.outer.wheelset", "front.inner.wheelset",
           "rear.inner.wheelset", "rear.outer.wheelset")  # fmt: skip

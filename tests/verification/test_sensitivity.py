@@ -9,7 +9,7 @@ from test_fixed_bodies import hanging, rig
 
 import railsim
 from railsim.definitions.settings import Settings
-from railsim.identification.derivatives import _central
+from railsim.identification.derivatives import _central, _one
 
 pytestmark = pytest.mark.usefixtures("small_contact_tables_in_module")  # the anchor is fixed
 STRAIGHT = load_track("straight")
@@ -120,6 +120,41 @@ def test_the_error_is_what_two_steps_differ_by():
     assert runs == 5
     exact = 1.0 + 2e-4 * np.pi / 0.01
     assert found.error == pytest.approx(abs(exact - found.value[0]) / exact, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("slope", "curvature", "share"),
+    [
+        (2.0, 3.0, 0.015),
+        (-2.0, 3.0, 0.015),
+        (0.5, -3.0, 0.06),
+        (1.0, 20.0, 0.2),
+        (0.0, 3.0, 1000.0),
+    ],
+)
+def test_sides_of_a_parabola_differ_by_its_curvature(slope, curvature, share):
+    """a x + b x^2, step h: a +- b h, so that b h/a is left; of an extremum 1/1000 of a side counts.
+
+    The next term of the series is the square of this share; beyond a tenth it is told itself.
+    """
+    h = 0.01
+    above, below = (np.full(3, slope * x + curvature * x**2) for x in (h, -h))
+    found, ratio = _one(np.zeros(3), above, below, h, None)
+    assert found.value == pytest.approx(slope)
+    assert ratio == pytest.approx(share)
+    assert found.error == pytest.approx(share**2 if share < 0.1 else max(share, share**2))
+    other, _ = _one(np.zeros(3), 1.05 * above, 1.05 * below, h, found)
+    if share < 0.1:  # a second step says what it differs by: 0.05 of 1.05
+        assert other.error == pytest.approx(0.05 / 1.05)
+
+
+@pytest.mark.parametrize(("kink", "kinked"), [(0.09, 0.0), (0.11, 0.5), (-0.11, 0.5)])
+def test_sides_that_differ_by_a_fifth_of_the_largest_derivative_are_a_kink(kink, kinked):
+    """x + k |x| beside x."""
+    above, below = (np.array([x, x + kink * abs(x)]) for x in (0.01, -0.01))
+    found, _ = _one(np.zeros(2), above, below, 0.01, None)
+    assert found.value == pytest.approx(1.0)
+    assert found.kinked == kinked
 
 
 @pytest.mark.parametrize(
