@@ -92,7 +92,7 @@ def shift_of(
         return None
     middles, shifts, correlations = np.transpose(clear)
     stretch, at_zero = 0.0, np.median(shifts)
-    near = np.abs(shifts - at_zero) < max(10 * STEP, 0.01 * np.ptp(middles))
+    near = np.abs(shifts - at_zero) < 0.01 * np.ptp(middles)
     if np.count_nonzero(near) > 2:
         stretch, at_zero = np.polyfit(middles[near], shifts[near], 1)
     near = int(np.sum(np.abs(shifts - at_zero - stretch * middles) < NEAR))
