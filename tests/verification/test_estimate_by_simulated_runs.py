@@ -6,6 +6,7 @@ import pytest
 import railsim
 from railsim.definitions.excitations.base import CHANNELS
 from railsim.observation import Assumed, simulated
+from railsim.observation.estimate import _merged
 from railsim.observation.innovations import Powers, likely_sizes, spectra_of
 from railsim.observation.pieces import STEP, Piece
 from railsim.observation.simulated import CHANGE, Reading, SimulatedRun, _series, refined
@@ -181,6 +182,16 @@ def test_a_speed_is_constant_within_a_hundredth_of_its_mean(spread, steady):
     piece = Piece(grid, np.zeros((0, N)), np.zeros((0, N), dtype=bool), speeds, 500.0)
     coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("straight")
     assert SimulatedRun(coach, track, piece, {}, []).is_steady is steady
+
+
+@pytest.mark.parametrize(
+    ("own", "apart", "one"),
+    [((), 2.09, True), ((), 2.11, False), ((1.0, 0.5), 2.49, True), ((1.0, 0.5), 2.51, False)],
+)
+def test_ranges_that_nearly_touch_are_one(own, apart, one):
+    """Waves by a twentieth of their length, places by a distance; one within another adds none."""
+    found = _merged([(1.0, 2.0), (1.2, 1.5), (apart, 4.0)], *own)
+    assert found == ([(1.0, 4.0)] if one else [(1.0, 2.0), (apart, 4.0)])
 
 
 def test_forces_of_a_simulated_run_are_those_of_their_wheel_or_wheelset():

@@ -21,7 +21,7 @@ from railsim.measurement.counterpart import amplified, amplifier
 from railsim.observation import Assumed, contact, irregularity
 from railsim.observation.estimate import BANDS, Estimate, joined
 from railsim.observation.estimate import rms as deviation
-from railsim.observation.irregularity import _flanges
+from railsim.observation.irregularity import _flanges, _Smooth
 from railsim.observation.pieces import Piece, on_grid
 from railsim.observation.simulated import SimulatedRun
 from railsim.plot.observation import irregularity_figure
@@ -376,6 +376,21 @@ def test_a_curve_without_simulated_runs_is_said_and_spoils_nothing_elsewhere(sho
     straight = found.s < 220.0
     off = (found.bands["D2"] - short[3].bands["D2"][:, : len(found.s)])[0, straight]
     assert rms(off) < 0.3e-3  # was 6 mm; 0.4 mm stated
+
+
+@pytest.mark.parametrize(
+    ("radius", "cant", "expected"),
+    [(600.0, 0.1, (0.00167, 0.1)), (-600.0, -0.1, (-0.00167, -0.1)), (600.0, 0.0, (0.00167, 0.0)),
+     (99e3, 0.1, (1.01e-5, 0.1)), (101e3, 0.1, (0.0, 0.0))],
+)  # fmt: skip
+def test_a_piece_is_estimated_in_its_sharpest_curve(radius, cant, expected):
+    """Beyond R 100 km none."""
+    grid = np.arange(0.0, 900.0, 0.5)
+    where = SimpleNamespace(_alignment=Alignment(canted_curve(radius, cant, 900.0)))
+    found = _Smooth._sharpest(where, SimpleNamespace(grid=grid))
+    assert found == pytest.approx(expected)
+    ahead = _Smooth._sharpest(where, SimpleNamespace(grid=grid[grid < 240.0]))
+    assert ahead == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("curved", [True, False])
