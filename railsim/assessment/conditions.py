@@ -103,7 +103,7 @@ def _compared(
 ) -> Condition:
     """Condition of a rule of the limits file; not checked where that has none."""
     if rule is None:
-        return Condition(name, place, NOT_CHECKED, found, "no value in the limits file")
+        return Condition(name, place, NOT_CHECKED, found, "a value in the limits file")
     return Condition(name, place, _stated(met), found, required, rule.source, rule.checked)
 
 
@@ -211,7 +211,7 @@ def _quality(
         f"{100.0 * worse / len(rows):.0f} % worse than QN2"
     )
     if target is None:
-        return Condition("track quality", place, NOT_CHECKED, found, "no target in the limits file")
+        return Condition("track quality", place, NOT_CHECKED, found, "a target in the limits file")
     met = ends[0] <= alignment <= ends[1] and ends[2] <= level <= ends[3]
     required = f"{low_a:.2f} to {high_a:.2f} mm and {low_l:.2f} to {high_l:.2f} mm"
     return _compared("track quality", place, found, target, required, met=met)
@@ -257,7 +257,7 @@ def _conicity(
     names = ("low conicity in zone 1", "high conicity in zone 1")
     known = values[np.isfinite(values)]
     if classes is None or not len(known):
-        why = "no classes in the limits file" if classes is None else "a wheelset that fits"
+        why = "classes in the limits file" if classes is None else "a wheelset that fits"
         return [Condition(name, "", NOT_CHECKED, "not known", why) for name in names]
     speed = service.admissible_speed
     high = up_to(classes.high, speed, classes.high_above)

@@ -1,7 +1,9 @@
 """What decides a verdict: one made-up record for every rule."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -317,6 +319,26 @@ def test_conditions_are_met_not_met_or_not_checked():
     assert states["friction"] == "met"
     assert states["load states"] in ("not met", "not checked")
     assert all(c.sentence in found.reasons for c in found.conditions if c.state != "met")
+
+
+def test_what_a_limits_file_does_not_hold_is_not_checked_and_said(tmp_path):
+    text = (Path(railsim.__file__).parent.parent / "limits/en14363.toml").read_text("utf-8")
+    own = tmp_path / "own.toml"
+    own.write_text(re.sub(r"(?ms)^\[(conicity|track_quality|friction|gauge)\].*?(?=^\[)", "", text))
+    profiles = {name: load_profile(name) for name in ("S1002", "60E1")}
+    run = made(track(STRAIGHT, irregularities=[random(3)]), FAST, profiles=profiles)
+    (found,) = assess(run, limits=own)
+    for name, lacks in (
+        ("low conicity in zone 1", "classes"),
+        ("high conicity in zone 1", "classes"),
+        ("track quality", "a target"),
+        ("friction", "a value"),
+        ("gauge", "a value"),
+    ):
+        one = condition(found, name)
+        assert (one.state, one.required) == ("not checked", f"{lacks} in the limits file")
+        assert one.sentence.endswith(f"not checked: {one.found}; required {one.required}")
+        assert one.sentence in found.reasons
 
 
 @pytest.mark.parametrize("gauge", [1.0, 1.435, 1.45, 1.668])
