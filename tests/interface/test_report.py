@@ -37,10 +37,11 @@ from railsim.report.curves import (
     groups,
     thinned,
 )
-from railsim.report.document import day
+from railsim.report.document import Drawing, Section, day
 from railsim.report.drawings import track_svg
 from railsim.report.inputs import _settings, inputs_of, what_was_run
 from railsim.report.limits import assessed
+from railsim.report.measured import Part, as_section
 from railsim.report.published import beside_published, reading
 from railsim.report.runs import _lead, _peaks, page
 from railsim.report.spread import columns, command, parameters, spread_rows, worst_rows, worst_runs
@@ -48,6 +49,7 @@ from railsim.result import Hdf5Sink, peaks
 from railsim.result.export import selected
 from railsim.result.extremes import run_facts
 from railsim.studies.gathered import gather
+from railsim.table import Column, Table
 from railsim.text import in_words
 
 BROWSER = next(
@@ -864,6 +866,18 @@ def test_page_and_assessment_of_a_folder_agree(tmp_path, capsys):
     # a section without curves says so instead of showing controls
     assert "The results hold none of the quantities that are drawn here." in html
     assert '"curves":[]' in html
+
+
+def test_a_comparison_among_runs_has_its_first_table_open_and_all_others_folded():
+    tables = [Table([Column("place")], [[k]], caption=f"of {k}") for k in range(4)]
+    sections = [Section("one", ["first"], tables[:2], [drawn := Drawing("picture", "", "svg")])]
+    sections += [Section("none", ["second"]), Section("two", [], tables[2:])]
+    found = as_section(Part("against a test", "It matches.", True, ["rough"], sections, []), 3)
+    assert (found.title, found.id) == ("against a test", "measured3")
+    assert found.texts == ["It matches.", "rough", "first", "second"]
+    assert found.drawings == [drawn]
+    assert [table.caption for table in found.tables] == ["one: of 0"]
+    assert [table.caption for table in found.details] == ["one: of 1", "two: of 2", "two: of 3"]
 
 
 def test_assessments_of_two_vehicles_of_one_name_stand_side_by_side():

@@ -16,8 +16,9 @@ from started import started
 import railsim
 import railsim.files.access
 from railsim.cli import main
-from railsim.errors import ModelError
+from railsim.errors import InputError, ModelError
 from railsim.simulation.assumptions import assumptions
+from railsim.simulation.conditions import state_before
 from railsim.simulation.step_choice import StepChoice
 
 COACH = ["run", "coach_manchester", "curve_r250"]
@@ -117,6 +118,16 @@ def test_continuation_of_something_else_is_refused(written, tmp_path, capsys, ch
     assert words in error
     assert "Traceback" not in error
     assert not path.exists()
+
+
+def test_a_result_without_its_state_is_not_continued(written):
+    run = railsim.open_result(written)
+    arrays = {name: run[name] for name in run}
+    parted = railsim.Result(arrays, run.quantities, run.coordinates, run.attributes)
+    with pytest.raises(InputError) as caught:
+        state_before(run.vehicle(), run.track(), run.settings(), parted)
+    assert len(caught.value.faults) == 1
+    assert "the result holds no state at its end" in str(caught.value)
 
 
 def test_continuation_of_no_result_is_refused(tmp_path, capsys):

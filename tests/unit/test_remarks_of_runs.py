@@ -198,8 +198,20 @@ def test_each_remark_is_logged_once_and_what_was_asked_for_is_not(caplog):
             "Wheels spin: b turns more than 5 % faster than it rolls for 100 % of the "
             "run, up to 30 %.",
         ),
-        (1.0, 0.1, ""),  # a blow
-        (0.04, 10.0, ""),
+        (1.0, 0.2, ""),  # a blow
+        (
+            1.0,
+            0.21,
+            "Wheels slide: b turns more than 5 % slower than it rolls for 2.1 % of the run, "
+            "up to 100 %.",
+        ),
+        (0.05, 10.0, ""),
+        (
+            -0.051,
+            10.0,
+            "Wheels spin: b turns more than 5 % faster than it rolls for 100 % of the "
+            "run, up to 5 %.",
+        ),
     ],
 )
 def test_a_wheelset_that_turns_slower_or_faster_than_it_rolls_is_told(creepage, for_s, words):
