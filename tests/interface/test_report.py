@@ -627,6 +627,24 @@ def test_the_head_of_a_page_names_few_vehicles_and_counts_many(vehicles, words):
     assert _lead(records, {}) == f"{number}; {words}; track t."
 
 
+@pytest.mark.parametrize(("way", "axis"), [(0.9, "Time t (s)"), (1.1, "Distance along the track")])
+def test_curves_of_a_run_of_less_than_a_metre_are_drawn_over_time(way, axis):
+    """Of two instants, and beside a run that goes on."""
+    moving = made(track({"type": "STR", "length": 500.0}), 20.0)
+    rows = [0, np.argmin(np.abs(moving["distance"] - moving["distance"][0] - way))]
+    first = moving["distance"][rows]
+    assert np.ptp(first) == pytest.approx(way, abs=0.09)
+    count = len(moving["time"])
+    arrays = {n: v[rows] if len(v := moving[n]) == count else v for n in moving}
+    short = railsim.Result(arrays, moving.quantities, moving.coordinates, moving.attributes)
+    for runs in ({"short": short}, {"long": moving, "short": short}):
+        data = curve_data(runs)
+        assert data["axis"].startswith(axis)
+        over = "time" if axis[0] == "T" else "distance"
+        assert data["low"] == min(run[over][0] for run in runs.values())
+        assert data["high"] == max(run[over][-1] for run in runs.values())
+
+
 def test_curves_are_thinned_by_the_run_with_most_wheelsets():
     """Two bytes for each of nine curves a wheelset, smallest and largest value of every cell."""
     single, long = SimpleNamespace(wheelsets=["1"]), SimpleNamespace(wheelsets=[*"12345678"])
