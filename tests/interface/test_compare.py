@@ -10,8 +10,9 @@ from example_result import example_result, text
 
 import railsim
 from railsim.cli import main
-from railsim.compare import compare, conditions, differences
-from railsim.result import Result
+from railsim.compare import Comparison, compare, conditions, differences
+from railsim.notation import QUANTITIES
+from railsim.result import Peak, Result, peaks
 from railsim.result.export import selected
 
 
@@ -43,6 +44,20 @@ def test_difference_from_nothing_is_not_a_number(gain):
     (row, *_) = compare({"none": example_result(gain=gain), "base": example_result()})[3:]
     assert row.quantity.text(row.peaks["none"].value) == "0.00"
     assert row.record()["values"]["base"]["difference"] is None
+
+
+@pytest.mark.parametrize("name", sorted({peak.quantity.name for peak in peaks(example_result())}))
+def test_a_difference_is_that_from_a_value_that_is_not_shown_as_0(name):
+    """Just below and just above half of the last digit, on either side of 0."""
+    quantity = QUANTITIES[name]
+    digit = (quantity.least or 1e-3) / quantity.scale
+    for share in (0.49, 0.51, 1.0, -0.49, -0.51):
+        values = {"first": share * digit, "other": digit}
+        both = {label: Peak(quantity, value, {}, 0.0, 0.0) for label, value in values.items()}
+        found = Comparison(quantity, "peak", both, "first").differences["other"]
+        shown = float(quantity.text(share * digit))
+        expected = 1.0 / abs(share) - 1.0
+        assert found == pytest.approx(expected if shown else np.nan, nan_ok=True)
 
 
 def test_peaks_and_mid_curve_values_are_compared():
