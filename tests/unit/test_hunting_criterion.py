@@ -60,6 +60,15 @@ def test_a_steady_swing_is_told_with_frequency_amplitude_and_wheelsets(rate, fre
     assert found.lasts
 
 
+@pytest.mark.parametrize("frequency", [0.5, 15.0])
+def test_at_both_ends_of_the_band_a_swing_is_told_with_half_of_its_power(frequency):
+    found = hunting(
+        record(5e-3 * wave(times(40.0 / frequency + 20.0, 400.0), frequency), rate=400.0)
+    )
+    assert found.frequency == pytest.approx(frequency, rel=0.01)
+    assert found.amplitude == pytest.approx(5e-3 / np.sqrt(2.0), rel=0.03)
+
+
 def test_the_sentence_says_where_it_begins():
     time = times(20.0)
     sentence = hunting(record(7.4e-3 * wave(time, 4.8) * (time > 7.5))).sentence

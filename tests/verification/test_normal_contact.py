@@ -8,7 +8,7 @@ from test_contact_table import worn
 
 from railsim.contact import build_contact_table, contact_geometry, hertz
 from railsim.contact.elastic import loaded_contact
-from railsim.contact.exact_normal import exact_contact
+from railsim.contact.exact_normal import _reach, exact_contact
 from railsim.contact.table import TableGrid
 from railsim.profiles import Profile, load_profile
 
@@ -28,6 +28,27 @@ def round_rail(radius):
     depth = np.linspace(z[-1], max(0.02, z[-1] + 1e-4), 200)[1:]
     y = np.concatenate((y[0] - 0.05 * (depth - z[0])[::-1], y, y[-1] + 0.05 * (depth - z[-1])))
     return Profile("round", "rail", y, np.concatenate((depth[::-1], z, depth)))
+
+
+@pytest.mark.parametrize("edge", [3.6, 7.0, 7.3, 7.49])
+def test_a_line_of_elements_ends_where_the_square_of_its_pressure_is_zero(edge):
+    """As near the edge of Hertz's pressure; values at the middles, what pulls is 0."""
+    middles = np.arange(12) + 0.5
+    pressure = np.sqrt(np.maximum(5e12 * (edge - middles), 0.0))
+    assert _reach(pressure) == pytest.approx(edge)
+    radius = 10.0 * edge  # the whole ellipse is a little less than straight there
+    hertzian = np.sqrt(np.maximum(1.0 - ((np.arange(200) + 0.5) / radius) ** 2, 0.0))
+    assert _reach(hertzian) == pytest.approx(radius, abs=0.02)
+
+
+def test_a_line_that_does_not_fall_ends_half_an_element_beyond_its_last_middle():
+    for pressure, end in (
+        ([0.0, 0.0], 0.0),
+        ([2.0], 1.0),
+        ([1.0, 2.0, 0.0], 2.0),
+        ([2, 1.99], 2.5),
+    ):
+        assert _reach(np.array(pressure)) == pytest.approx(end)
 
 
 @points("radius", [0.05, 0.30], always=(0,))
