@@ -16,9 +16,10 @@ from railsim import cli
 from railsim.definitions.loading import load_mechanism
 from railsim.files.sources import find_file, library_files
 from railsim.mechanisms.analysis import analyse
+from railsim.mechanisms.model import build
 from railsim.mechanisms.optimum import optimised_text
 from railsim.plot.mechanisms import angles_figure
-from railsim.report.mechanisms import GIF_FRAMES
+from railsim.report.mechanisms import GIF_FRAMES, animation
 
 FEW = ["--set", "sampling.points=51"]
 BASE = [*FEW, "--set", "cases={}"]
@@ -191,6 +192,16 @@ class Text(HTMLParser):
 
     def handle_data(self, data):
         self.text.append(data)
+
+
+def test_a_film_runs_to_the_end_and_back_without_showing_an_end_twice(monkeypatch):
+    monkeypatch.setattr("railsim.report.mechanisms.GIF_FRAMES", 4)
+    mechanism = load_mechanism("atr95_lift_5")
+    shown = SimpleNamespace(model=build(mechanism), definition=mechanism)
+    with Image.open(io.BytesIO(animation(shown))) as film:
+        seen = [np.asarray(one.convert("L")) for one in ImageSequence.Iterator(film)]
+    order = [next(k for k, one in enumerate(seen) if np.array_equal(one, each)) for each in seen]
+    assert order == [0, 1, 2, 3, 2, 1]
 
 
 @pytest.mark.slow

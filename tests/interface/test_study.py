@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numba
@@ -36,6 +37,7 @@ from railsim.studies.case import load_case
 from railsim.studies.journal import Journal
 from railsim.studies.plan import parse_grid
 from railsim.studies.spec import RunSpec
+from railsim.studies.study import _draw
 
 COACH, CURVE, STRAIGHT = "coach_manchester", "curve_r250", "straight"
 LEFT = {"study.journal", "study.json", "summary.csv"}  # beside the results
@@ -222,6 +224,36 @@ def test_pictures_of_runs_and_of_vehicles_against_each_other(tmp_path, simulated
     (tmp_path / f"{COACH}_{CURVE}_20.h5").unlink()  # computed, and drawn, again
     assert main(given) == 0
     assert simulated == [20.0] * 3
+
+
+def test_a_picture_is_of_a_run_without_a_newer_one_or_of_vehicles_alike_in_all_else(
+    tmp_path, monkeypatch
+):
+    drawn, results, records = {}, {}, []
+    for name in ("a_t_10", "b_t_10", "a_t_20", "b_t_20", "a_t_30", "b_t_30"):
+        labels = {"vehicle": name[0], "track": "t", "speed": float(name[-2:])}
+        records.append({"name": name, "file": f"{name}.h5", "labels": labels})
+        results[name] = {"name": name, "time": [] if name == "b_t_20" else [0.0, 0.1]}
+        (tmp_path / f"{name}.h5").touch()
+        os.utime(tmp_path / f"{name}.h5", (100.0, 100.0))
+    del results["b_t_30"]
+    for name, when in (("a_t_10", 99.0), ("b_t_10", 101.0)):
+        (tmp_path / f"{name}.png").touch()
+        os.utime(tmp_path / f"{name}.png", (when, when))
+    stand_ins = {  # matplotlib takes seconds to import
+        "style": {"save": lambda what, to, **_: drawn.update({to: what})},
+        "histories": {"histories": lambda result: result["name"]},
+        "overlay": {"overlay": lambda some: {v: one["name"] for v, one in some.items()}},
+    }
+    for module, functions in stand_ins.items():
+        monkeypatch.setitem(sys.modules, f"railsim.plot.{module}", SimpleNamespace(**functions))
+    _draw(SimpleNamespace(results=lambda: results, records=records, folder=tmp_path))
+    assert drawn == {
+        tmp_path / "a_t_10.png": "a_t_10",
+        tmp_path / "a_t_20.png": "a_t_20",
+        tmp_path / "a_t_30.png": "a_t_30",
+        tmp_path / "compare_t_10.png": {"a": "a_t_10", "b": "b_t_10"},
+    }
 
 
 def test_json_holds_every_record(tmp_path, simulated, capsys):
