@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial.distance import cdist
 
-from railsim.studies.search import METHODS, Surrogate, Task, Values, knee, non_dominated
+from railsim.studies.search import METHODS, Surrogate, Task, Values, _promising, knee, non_dominated
 from railsim.studies.sensitivity import Sensitivity, sensitivities
 
 
@@ -37,6 +37,24 @@ def searched(problem, method, *, number, batch=8, seed=0, constraint=None, varia
     METHODS[method](task)
     designs = np.vstack(asked)
     return problem(designs), designs
+
+
+@pytest.mark.parametrize(
+    ("limit", "nearest"),
+    [(0.7, (0.6, 0.71)), (0.3, (0.2, 0.31)), (-0.5, (0.0, 0.1))],  # the last: none is feasible
+)
+def test_new_designs_are_looked_for_where_linear_constraints_are_met_or_broken_least(
+    limit, nearest
+):
+    """Both objectives improve with x0, and x0 <= limit; splines with a linear part are exact."""
+    designs = np.random.default_rng(2).random((30, 2))
+    objectives = np.column_stack([-designs[:, 0], -2.0 * designs[:, 0]])
+    values = Values(objectives, designs[:, :1] - limit)
+    found = _promising(designs, values, 4, np.random.default_rng(0))
+    assert len(found) == 4
+    # the last, and all that add nothing, look where nothing has been tried
+    led = found[: 3 if limit > 0.0 else 1, 0]
+    assert nearest[0] <= led.max() <= nearest[1]
 
 
 @pytest.mark.parametrize("problem", [zdt1, kursawe])
