@@ -121,6 +121,21 @@ def test_an_excitation_moves_the_rails_as_the_built_in_wave(curve, channel):
         assert np.allclose(rates, slopes, rtol=0.0, atol=1e-3 * largest)
 
 
+@pytest.mark.parametrize(
+    ("named", "given", "words"),
+    [("wve", True, "did you mean 'wave'?"), ("dip", True, "allowed: wave"),
+     ("wave", False, "there is none")],
+)  # fmt: skip
+def test_an_excitation_by_an_unknown_law_is_told_what_there_is(curve, named, given, words):
+    own = {"type": "law", "law": named, "shortest": 8.0, "parameters": {}}
+    known = {"wave": laws.law(wave)} if given else None
+    with pytest.raises(InputError) as raised:
+        displacement(curve.replace(irregularities=[own], laws=known))
+    assert len(raised.value.faults) == 1
+    assert f"irregularities.0.law: no law '{named}'" in str(raised.value)
+    assert words in str(raised.value)
+
+
 def test_a_vehicle_runs_over_an_excitation(coach, curve):
     ends = {"wavelengths": [8.0, 8.0], "begin": 16.0, "end": 80.0}
     sweep = {"type": "sweep", "channel": "vertical", "amplitude": 2e-3, **ends}
