@@ -165,6 +165,17 @@ def test_conditions_that_differ_are_said_and_those_alike_are_not(files, tmp_path
     assert head[1].split() == ["speed", "(m/s)", "20", "15"]
 
 
+@pytest.mark.parametrize("end", [0, -1])
+@pytest.mark.parametrize(("apart", "said"), [(0.99, False), (1.01, True), (-1.01, True)])
+def test_ends_that_lie_a_metre_apart_are_said(end, apart, said):
+    run = example_result()
+    arrays = {name: run[name] for name in run}
+    arrays["distance"] = run["distance"].copy()
+    arrays["distance"][end] += apart
+    other = Result(arrays, run.quantities, run.coordinates, run.attributes)
+    assert ("distance" in conditions({"a": run, "b": other})) == said
+
+
 def test_parts_of_the_track_that_differ_are_said():
     """Peaks of 340 m against those of 320 m, at 20 m/s; 0.8 m are where a run happens to end."""
     base, shorter = example_result(duration=17.0), example_result(duration=16.0)
