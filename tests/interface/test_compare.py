@@ -165,6 +165,20 @@ def test_conditions_that_differ_are_said_and_those_alike_are_not(files, tmp_path
     assert head[1].split() == ["speed", "(m/s)", "20", "15"]
 
 
+def test_results_without_an_instant_are_named_together():
+    run = example_result()
+    arrays = {
+        name: run[name][:0] if len(run[name]) == len(run["time"]) else run[name] for name in run
+    }
+    empty = Result(arrays, run.quantities, run.coordinates, {**run.attributes, "status": "stopped"})
+    with pytest.raises(railsim.InputError) as raised:
+        compare({"whole": run, "one": empty, "other": empty})
+    assert [(fault.file, fault.key) for fault in raised.value.faults] == [
+        ("one", "time"), ("other", "time")
+    ]  # fmt: skip
+    assert all("holds no instants (stopped)" in str(fault) for fault in raised.value.faults)
+
+
 @pytest.mark.parametrize("end", [0, -1])
 @pytest.mark.parametrize(("apart", "said"), [(0.99, False), (1.01, True), (-1.01, True)])
 def test_ends_that_lie_a_metre_apart_are_said(end, apart, said):
