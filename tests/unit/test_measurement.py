@@ -384,6 +384,26 @@ def test_the_place_is_found_by_the_level_of_the_rails():
         aligned(run, elsewhere)
 
 
+@pytest.mark.parametrize(("wave", "alike"), [(0.9, True), (6.0, False)])
+def test_the_level_is_looked_for_in_waves_of_3_to_40_m_alone(wave, alike):
+    """A wave of 0.9 m that shakes the axlebox ten times as much hides no place; one of 6 m does."""
+    run = railsim.load_measurement("coach_25t_run")
+    track = railsim.load_track(run.definition.track)
+    channels = dict(run.channels)
+    boxes = [n for n, q in run.quantities.items() if ":axlebox" in q and q.endswith(":z")]
+    assert boxes
+    for name in boxes:
+        size = 10.0 * np.nanstd(channels[name])
+        channels[name] = channels[name] + size * np.sin(2.0 * np.pi * run.distance / wave)
+    shaken = replace(run, channels=channels)
+    if not alike:
+        with pytest.raises(railsim.InputError, match="matches nowhere"):
+            aligned(shaken, track)
+        return
+    late = aligned(shaken, track).distance - run.distance + 3.0 + 8e-4 * run.distance
+    assert np.abs(late).max() < 0.6
+
+
 @pytest.mark.parametrize(
     ("jump", "begin", "words"),
     [
