@@ -41,14 +41,13 @@
     SLOPE_ALONG,
     SLOPE_ACROSS,
     SECANT_ALONG,
-    SLOPE_CROSS,
     RISE,
     FORCE_PER_Y,
     FORCE_PER_Z,
     FORCE_PER_ROLL,
     TURNING,
-) = range(41)
-PATCH_ROWS = 41
+) = range(40)
+PATCH_ROWS = 40
 
 # columns of Work.wheel[w, side]; creepages, normal force and position of the most loaded patch;
 # force of check rails and its wear number

@@ -1,11 +1,13 @@
 """How contact forces change with motions of wheelset and rail, for the implicit part of a step."""
 
-from math import sqrt
+from math import copysign, sqrt
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
+    C11,
+    C22,
     C_Y,
     C_Z,
     FOOT_Y,
@@ -23,6 +25,10 @@ from railsim.kernels.contact_columns import (
     NORMAL_STIFFNESS,
     NORMAL_Y,
     NORMAL_Z,
+    SECANT_ALONG,
+    SLOPE_ACROSS,
+    SLOPE_ALONG,
+    T_X,
     T_Y,
     TURNING,
 )
@@ -51,7 +57,7 @@ from railsim.kernels.support import (
 )
 
 # m/s, speed of travel below which the implicit part knows how creep forces in one direction follow
-# the slip in the others: without, steps in tight curves had to be up to thirty times as short
+# the slip in the others: without, steps in tight curves had to be up to 26 times as short
 WALKING = 3.0
 # there the slope across is this share of the force over the slip at least: spin turns the force of
 # a patch that slides, which the slopes do not know
@@ -64,7 +70,7 @@ LEAST, MOST = 0.03, 0.5
 
 
 @compiled(python=False)
-def creep_slopes(n, patches, speed, G, along, across, secant_along, cross):
+def creep_slopes(n, patches, speed, G, along, across, secant_along):
     """Slopes of the creep force along and across over the slip in that direction [N s/m].
 
     Those of the force mu N (1 - (1 - u/3)^3) in the direction of the linear one, u = |T_linear|/
@@ -79,9 +85,8 @@ def creep_slopes(n, patches, speed, G, along, across, secant_along, cross):
         Read only.
     speed, G : float
         Speed of travel [m/s]; shear modulus, reduced by the third body [Pa].
-    along, across, secant_along, cross : float64[>= n, by eights]
-        Written; zero without friction or load.  `secant_along`: the force along over the slip;
-        `cross`: slope of the force in one direction over the slip in the other one.
+    along, across, secant_along : float64[>= n, by eights]
+        Written; zero without friction or load.  `secant_along`: the force along over the slip.
     """
     a, b, mu_N = patches.a, patches.b, patches.mu_N
     c11, c22, c23 = patches.c11, patches.c22, patches.c23
@@ -100,12 +105,11 @@ def creep_slopes(n, patches, speed, G, along, across, secant_along, cross):
         left = one - u * (1.0 / 3.0)
         secant = where_beyond(u, 3.0, one / u, left + square * (1.0 / 27.0))
         tangent = where_beyond(u, 3.0, zero, left * left)
-        share, both = x * x / (square + 1e-300), x * y / (square + 1e-300)
+        share = x * x / (square + 1e-300)
         scale = where_beyond(load, 0.0, unit * per_speed, zero)
         store_lanes(along, i, scale * k11 * (secant + share * (tangent - secant)))
         store_lanes(across, i, scale * k22 * (tangent + share * (secant - tangent)))
         store_lanes(secant_along, i, scale * k11 * secant)
-        store_lanes(cross, i, scale * (0.5 * (k11 + k22)) * both * (tangent - secant))
 
 
 @compiled(python=False)
@@ -125,6 +129,32 @@ def add_to_row(row, first, factor, vector):
     row[first] += factor * vector[0]
     row[first + 1] += factor * vector[1]
     row[first + 2] += factor * vector[2]
+
+
+@compiled(python=False)
+def couple_directions(system, work, n):
+    """Add how `n` patches couple the speeds along the track, in yaw, and in y, z and roll.
+
+    Slips of the wheel along, x' + c_z pitch' - c_y yaw', and across, c y' - s z' + arm roll'.  With
+    the slopes of `creep_slopes`, C22/C11 times the secant along being that across, the slope of the
+    force in one direction over the slip in the other one is the root of what both slopes are below
+    their secants, against the sign of T_x T_y.
+    """
+    patch = work.patch
+    for k in range(n):
+        secant, across = patch[SECANT_ALONG, k], patch[SLOPE_ACROSS, k]
+        below = secant * patch[C22, k] / patch[C11, k] - across
+        below = max(0.0, below) * max(0.0, secant - patch[SLOPE_ALONG, k])
+        cross = -copysign(sqrt(below), patch[T_X, k] * patch[T_Y, k])
+        across = patch[SLOPE_ACROSS, k] = max(across, LEAST_ACROSS * secant)
+        s, c, cy = patch[NORMAL_Y, k], patch[NORMAL_Z, k], patch[C_Y, k]
+        if system.support.elastic:  # a rail that gives way is in series
+            cross /= 1.0 + across * (c * c * work.compliance[0] + s * s * work.compliance[1])
+        row = work.contact_jacobian[system.contact.body[work.patch_index[k, 0]]]
+        direction = c, -s, -c * patch[C_Z, k] - s * cy
+        row[J_SECANT_ASIDE] += secant * cy
+        add_to_row(row, J_CROSS, cross, direction)
+        add_to_row(row, J_CROSS_YAW, cross * cy, direction)
 
 
 @compiled(python=False)
@@ -245,19 +275,3 @@ def add_damping(work, b, k, across, damping):
     add_to_row(row, J_NORMAL, damping * (s + share * c), normal)
     add_to_row(row, J_NORMAL + 3, damping * (c - share * s), normal)
     add_to_row(row, J_NORMAL + 6, damping * (lever + share * arm), normal)
-
-
-@compiled(python=False)
-def add_coupling(work, b, k, secant, cross):
-    """Add how patch `k` couples the speeds along the track, in yaw, and in y, z and roll.
-
-    Slips of the wheel along, x' + c_z pitch' - c_y yaw', and across, c y' - s z' + arm roll', with
-    the slopes `secant` of the force along over the former and `cross` over the other one.
-    """
-    row, patch = work.contact_jacobian[b], work.patch
-    s, c = patch[NORMAL_Y, k], patch[NORMAL_Z, k]
-    cy = patch[C_Y, k]
-    across = c, -s, -c * patch[C_Z, k] - s * cy
-    row[J_SECANT_ASIDE] += secant * cy
-    add_to_row(row, J_CROSS, cross, across)
-    add_to_row(row, J_CROSS_YAW, cross * cy, across)

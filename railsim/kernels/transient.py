@@ -31,7 +31,6 @@ from railsim.kernels.contact_columns import (
     SECANT_ALONG,
     SLOPE_ACROSS,
     SLOPE_ALONG,
-    SLOPE_CROSS,
     XI_X,
     A,
 )
@@ -95,7 +94,6 @@ def give_back_creepages(system, work, n, state):
             patch[SLOPE_ALONG, k] *= at_once
             patch[SLOPE_ACROSS, k] *= at_once
             patch[SECANT_ALONG, k] *= at_once
-            patch[SLOPE_CROSS, k] *= at_once
 
 
 @compiled(python=False)

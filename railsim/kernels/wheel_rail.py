@@ -48,7 +48,6 @@ from railsim.kernels.contact_columns import (
     SECANT_ALONG,
     SLOPE_ACROSS,
     SLOPE_ALONG,
-    SLOPE_CROSS,
     T_X,
     T_Y,
     TURN_Y,
@@ -69,12 +68,11 @@ from railsim.kernels.contact_columns import (
     B,
 )
 from railsim.kernels.contact_damping import (
-    LEAST_ACROSS,
     WALKING,
-    add_coupling,
     add_damping,
     add_slopes,
     begin_support,
+    couple_directions,
     creep_slopes,
 )
 from railsim.kernels.creep import creep_forces, falling_friction
@@ -131,16 +129,13 @@ def add_creep_forces(system, work, n, speed, state):
             wheel[w, side, W_C_Y] = cy
             wheel[w, side, W_C_Z] = cz
         secant, across = patch[SECANT_ALONG, k], patch[SLOPE_ACROSS, k]
-        if rarely(speed < WALKING):
-            across = max(across, LEAST_ACROSS * secant)
-        damping, yields = patch[NORMAL_DAMPING, k], 1.0
+        damping = patch[NORMAL_DAMPING, k]
         if system.support.elastic:
             add_slopes(work, w, side, k, across, contact.shear[contact.table[w, side]])
             work.support[w, side, PATCHES] += float(1 << work.patch_index[k, 2])
             # a rail that gives way is in series with creep force and contact
             y, z, lag = work.compliance[0], work.compliance[1], work.compliance[2]
-            yields = 1.0 + across * (c * c * y + s * s * z)
-            across /= yields
+            across /= 1.0 + across * (c * c * y + s * s * z)
             contact_damping = damping + lag * patch[NORMAL_STIFFNESS, k]
             damping /= 1.0 + contact_damping * (s * s * y + c * c * z)
         else:  # over long steps, see `model.time_step`
@@ -150,8 +145,6 @@ def add_creep_forces(system, work, n, speed, state):
         work.contact_jacobian[b, J_SECANT_LEVER] += secant * cz
         work.contact_jacobian[b, J_SECANT_YAW] += secant * cy * cy
         add_damping(work, b, k, across, damping)
-        if rarely(speed < WALKING):
-            add_coupling(work, b, k, secant, patch[SLOPE_CROSS, k] / yields)
         work.events[w, 0] += 1
         work.events[w, 1] += int(patch[BEYOND, k])
     if system.support.elastic:
@@ -203,9 +196,11 @@ def wheel_rail(system, work, speed, state):
         follow_creepages(system, work, n, state)
     creep_forces(n, contact.law, patches, work.creep)
     G = contact.law.k_adhesion * contact.law.G
-    slopes = patch[SLOPE_ALONG], patch[SLOPE_ACROSS], patch[SECANT_ALONG], patch[SLOPE_CROSS]
+    slopes = patch[SLOPE_ALONG], patch[SLOPE_ACROSS], patch[SECANT_ALONG]
     creep_slopes(n, patches, speed, G, *slopes)
     if rarely(contact.transient != 0):
         give_back_creepages(system, work, n, state)
+    if rarely(speed < WALKING):
+        couple_directions(system, work, n)
     add_creep_forces(system, work, n, speed, state)
     return RUNNING, 0, n

@@ -34,6 +34,8 @@ from railsim.kernels.contact_columns import (
     B_ACROSS,
     B_HEIGHT,
     BUMP_SIZE,
+    C11,
+    C22,
     C_X,
     C_Y,
     C_Z,
@@ -53,6 +55,10 @@ from railsim.kernels.contact_columns import (
     PATCH_SPEED,
     PHI,
     RISE,
+    SECANT_ALONG,
+    SLOPE_ACROSS,
+    SLOPE_ALONG,
+    T_X,
     T_Y,
     TURN_Y,
     TURN_Z,
@@ -330,19 +336,25 @@ def test_implicit_damping_at_walking_pace_solves_the_matrix_of_all_directions(h,
     plain(step_fast)
     plain(contact_damping)
     patch, cz, angle = random.uniform(0.2, 1.0, (PATCH_ROWS, 2)), 0.45, np.array([0.02, -1.1])
-    patch[C_Z], patch[C_Y], patch[T_Y] = cz, [0.75, -0.75], 0.0
+    patch[C_Z], patch[C_Y] = cz, [0.75, -0.75]
     patch[NORMAL_Y], patch[NORMAL_Z] = np.sin(angle), np.cos(angle)
-    work = Record(patch=patch, coupled=np.zeros((5, 8)))
+    secant, along, across = random.uniform([[1.2], [0.5], [0.5]], [[1.5], [1.1], [1.1]], (3, 2))
+    patch[[SECANT_ALONG, SLOPE_ALONG, SLOPE_ACROSS]], patch[C11] = (secant, along, across), 4.0
+    patch[C22], patch[T_X] = 4.0, [-1.0, 1.0]
+    patch[T_Y] = 1e-9
+    cross = np.sqrt((secant - along) * (secant - across)) * [1.0, -1.0]
+    work = Record(patch=patch, coupled=np.zeros((5, 8)), patch_index=np.zeros((2, 1), int))
     work.contact_jacobian = np.zeros((2, CONTACT_JACOBIAN))
+    system = Record(support=Record(elastic=0), contact=Record(body=[1]))
+    contact_damping.couple_directions(system, work, 2)
     D, N, J = np.zeros((6, 6)), np.zeros((6, 6)), work.contact_jacobian[1]
-    for k, (secant, across, cross, damping) in enumerate(random.uniform(0.5, 1.5, (2, 4))):
-        contact_damping.add_damping(work, 1, k, across, damping)
-        contact_damping.add_coupling(work, 1, k, secant, 0.3 * cross)
-        J[[J_SECANT, J_SECANT_LEVER]] += secant, secant * cz
-        J[J_SECANT_YAW] += secant * patch[C_Y, k] ** 2
+    for k, damping in enumerate((0.6, 1.3)):
+        contact_damping.add_damping(work, 1, k, across[k], damping)
+        J[[J_SECANT, J_SECANT_LEVER]] += secant[k], secant[k] * cz
+        J[J_SECANT_YAW] += secant[k] * patch[C_Y, k] ** 2
         s, c, cy = np.sin(angle[k]), np.cos(angle[k]), patch[C_Y, k]
         G = np.array([[1, 0, 0, 0, cz, -cy], [0, c, -s, -c * cz - s * cy, 0, 0]])
-        D += G.T @ np.array([[secant, 0.3 * cross], [0.3 * cross, across]]) @ G
+        D += G.T @ np.array([[secant[k], cross[k]], [cross[k], across[k]]]) @ G
         normal = np.array([0, s, c, c * cy - s * cz, 0, 0])
         N += damping * np.outer(normal, normal)
     row = np.zeros((2, 8))
