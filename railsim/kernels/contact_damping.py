@@ -57,8 +57,9 @@ from railsim.kernels.support import (
 )
 
 # m/s, speed of travel below which the implicit part knows how creep forces in one direction follow
-# the slip in the others: without, steps in tight curves had to be up to 26 times as short
-WALKING = 3.0
+# the slip in the others: without, steps in tight curves had to be up to 26 times as short.  Just
+# below the lowest speed of a class of runs, 1.2^6, so that all of a class do without
+WALKING = 2.98
 # there the slope across is this share of the force over the slip at least: spin turns the force of
 # a patch that slides, which the slopes do not know
 LEAST_ACROSS = 0.2
