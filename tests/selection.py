@@ -33,6 +33,20 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
+        "interface/test_wear.py::test_steps_are_kept_and_a_longer_distance_goes_on",
+        "interface/test_contact.py::test_pictures_and_tables_are_written_and_kept",
+        "reliability/test_ends.py::test_physical_end_keeps_its_result[standstill]",
+        "verification/test_identification.py::test_the_command_writes_vehicle_page_and_json",
+        "interface/test_report.py::"
+        "test_study_without_results_has_table_curves_map_and_parallel_coordinates",
+        "verification/test_critical_speed.py::test_a_limit_that_is_not_reached_is_said_so",
+        "verification/test_start_in_curve.py::"
+        "test_curving_has_what_the_way_leaves_in_friction_elements",
+        "verification/test_linear_relations.py::"
+        "test_response_to_waves_is_that_of_a_run_on_them[cross_level]",
+        "properties/test_mechanism_scaling.py::"
+        "test_an_enlarged_mechanism_has_every_result_enlarged_by_its_unit[atr95_lift_5]",
+        "interface/test_stationary.py::test_limit_in_the_picture_has_its_value",
         "interface/test_imports.py::test_commands_import_nothing_that_they_do_not_use[result]",
         "interface/test_examples.py::test_measured_run_is_that_of_today_but_for_its_noise",
         "reliability/test_other_systems.py::test_command_works_without_what_posix_has[study]",
