@@ -103,7 +103,7 @@ def check_range(
     right = low <= speed <= high
     faults.require(right, "speed", f"found {speed:.12g} m/s", f"{low:g} to {high:g} m/s")
     right = 0.0 <= start < track.length
-    faults.require(right, "start", f"found {start:.12g} m", f"0 to {end}")
+    faults.require(right, "start", f"found {start:.12g} m", f"0 to less than {end}")
     if duration is not None:
         right = 0.0 < duration < math.inf
         faults.require(right, "duration", f"found {float(duration):.12g} s", "a positive number")

@@ -216,7 +216,7 @@ def test_wrong_measured_track_is_told(tmp_path, capsys, monkeypatch, csv, words)
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--start", "-5"], "--start: found -5 m; 0 to 1000 m"),
+        (["--start", "-5"], "--start: found -5 m; 0 to less than 1000 m"),
         (["--start", "1000"], "--start: found 1000 m"),
         (["--start", "nan"], "--start: found nan m"),
         (["--start", "50", "--until", "40"], "--until: found 40 m; more than the start, 50 m"),
