@@ -33,6 +33,18 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
+        "interface/test_fmu.py::test_the_unit_without_commands_is_the_run",
+        "verification/test_model_validation.py::"
+        "test_a_study_gives_the_result_on_the_same_track_in_the_same_load",
+        "verification/test_model_validation.py::"
+        "test_sections_in_which_a_channel_rests_are_left_out_and_named",
+        "unit/test_threads.py::test_workers_that_end_by_themselves_in_time_are_not_killed",
+        "interface/test_modes.py::test_root_locus_in_json_and_folder",
+        "verification/test_bridge.py::"
+        "test_a_heavy_bridge_under_the_coach_deflects_as_under_its_loads[40.0]",
+        "verification/test_creep_law_runs.py::"
+        "test_error_of_the_step_with_the_table_is_that_with_fastsim",
+        "interface/test_report.py::test_the_most_unloaded_wheel_has_the_strongest_colour_of_a_map",
         "interface/test_wear.py::test_steps_are_kept_and_a_longer_distance_goes_on",
         "interface/test_contact.py::test_pictures_and_tables_are_written_and_kept",
         "reliability/test_ends.py::test_physical_end_keeps_its_result[standstill]",

@@ -29,7 +29,7 @@ SMALL = {
     "mechanisms.py": ["--starts", "1", "--search", "atr95_lift_3", "--repeats", "1"],
     "optimise.py": ["out", "small.toml", "--side", "3", "--seeds", "0"],
     "peers.py": ["--small"],
-    "springs.py": ["--repeats", "1"],
+    "springs.py": ["--repeats", "1", "--without-search"],
     "study_cost.py": ["out", "--vehicles", "coach_manchester", "--tracks", "straight",
                       "--speeds", "1", "--frictions", "1", "--duration", "1", "--workers", "1"],
     "versions.py": ["--small", "--rounds", "1", "--commands", "0", "--jobs", "0"],
