@@ -109,14 +109,11 @@ def _done(records: Sequence[Record]) -> list[Record]:
 
 
 def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
-    names = {kind: list(dict.fromkeys(str(record["labels"].get(kind, "")) for record in records))
-             for kind in ("vehicle", "track")}  # fmt: skip
     parts = [f"{len(records)} run{'s' * (len(records) != 1)}"]
-    for kind, found in names.items():
-        if len(found) <= 4 and all(found):
-            parts.append(f"{kind}{'s' * (len(found) > 1)} {', '.join(found)}")
-        else:
-            parts.append(f"{len(found)} {kind}s")
+    if len(records) == len(results) == 1:
+        parts += [result.title for result in results.values()]
+    else:
+        parts += filter(None, (_named(records, kind) for kind in ("vehicle", "track", "speed")))
     versions = sorted({str(r.attributes.get("railsim_version", "")) for r in results.values()})
     created = sorted(str(r.attributes.get("created", "")) for r in results.values())
     if versions and any(versions):
@@ -124,6 +121,19 @@ def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
     if created and created[-1]:
         parts.append(f"last run on {doc.day(created[-1])}")
     return "; ".join(parts) + "."
+
+
+def _named(records: Sequence[Record], kind: str) -> str:
+    """Return the vehicles, tracks or speeds of runs, or their number where there are many."""
+    found = list(dict.fromkeys(record["labels"].get(kind, "") for record in records))
+    if kind == "speed" and "" in found:  # every run has one, but not every record names it
+        return ""
+    unit = " m/s" if kind == "speed" else ""
+    if len(found) <= 4 and all(map(str, found)):
+        words = ", ".join(f"{one:.6g}" if unit else str(one) for one in found)
+        return f"{kind}{'s' * (len(found) > 1)} {words}{unit}"
+    span = f" from {min(found):.6g} to {max(found):.6g} m/s" if unit else ""
+    return f"{len(found)} {kind}s{span}"
 
 
 def _verdict(

@@ -627,6 +627,26 @@ def test_the_head_of_a_page_names_few_vehicles_and_counts_many(vehicles, words):
     assert _lead(records, {}) == f"{number}; {words}; track t."
 
 
+@pytest.mark.parametrize(
+    ("speeds", "words"),
+    [
+        ([8.0], "speed 8 m/s"),
+        ([8.0, 22.5, 8.0], "speeds 8, 22.5 m/s"),
+        ([30.0, 10.0, 15.0, 20.0, 25.0], "5 speeds from 10 to 30 m/s"),
+    ],
+)
+def test_the_head_of_a_page_says_the_speeds_of_its_runs(speeds, words):
+    records = [{"labels": {"vehicle": "a", "track": "t", "speed": speed}} for speed in speeds]
+    assert _lead(records, {}).endswith(f"; vehicle a; track t; {words}.")
+
+
+def test_the_head_of_the_page_of_one_run_says_its_load_case_and_speed():
+    result = example_result(speed=20.0)
+    records = [{"labels": {"vehicle": "a", "track": "t", "speed": 20.0}}]
+    assert f"; {result.title}; " in _lead(records, {"run": result})
+    assert "at 20 m/s (72 km/h)" in result.title
+
+
 @pytest.mark.parametrize(("way", "axis"), [(0.9, "Time t (s)"), (1.1, "Distance along the track")])
 def test_curves_of_a_run_of_less_than_a_metre_are_drawn_over_time(way, axis):
     """Of two instants, and beside a run that goes on."""
