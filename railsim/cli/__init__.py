@@ -98,11 +98,8 @@ class LazyGroup(click.Group):
         """Return the commands that begin so, without importing them."""
         if incomplete.startswith("-"):
             return super().shell_complete(ctx, incomplete)
-        return [
-            CompletionItem(name, help=words)
-            for name, words in COMMANDS.items()
-            if name.startswith(incomplete)
-        ]
+        known = (name for name in COMMANDS if name.startswith(incomplete))
+        return [CompletionItem(name, help=COMMANDS[name]) for name in known]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands without importing them."""

@@ -189,10 +189,8 @@ def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
 
 _allowed: dict[str, Any] = {"expose_value": False, "callback": _allow}
 allow_code_option = flag("--allow-code", "Execute Python code of laws that files name.", **_allowed)
-code_options = together(
-    allow_code_option,
-    repeated("--law", "Execute the laws of this file or name.", "FILE", **_allowed),
-)
+_law_option = repeated("--law", "Execute the laws of this file or name.", "FILE", **_allowed)
+code_options = together(allow_code_option, _law_option)
 
 
 def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F], F]:

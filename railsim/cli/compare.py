@@ -167,10 +167,8 @@ def _of_several(folders: list[str], output: cli.Output) -> dict[str, Group]:
             output.remark(f"{len(alone)} runs of {folder} are not in all folders: {alone[0]}{more}")
     stems = [Path(folder).name for folder in folders]
     labels = stems if len(set(stems)) == len(stems) else folders
-    return {
-        name: _results(dict(zip(labels, (runs[folder][name] for folder in folders), strict=True)))
-        for name in common
-    }
+    labelled = dict(zip(labels, runs.values(), strict=True))
+    return {run: _results({n: paths[run] for n, paths in labelled.items()}) for run in common}
 
 
 def _results(paths: dict[str, Path]) -> Group:

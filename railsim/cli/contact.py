@@ -173,10 +173,8 @@ def _described(found: "ContactSummary") -> "Description":
     gauge_values = gauge_table(wheels, diameter=diameter, **between)
     steering = steering_index(found.geometry, RADIUS, min(found.radii))
     data: dict[str, Any] = {name: values.tolist() for name, values in found.functions.items()}
-    data["equivalent_conicity"] = [
-        {"amplitude": float(a), "value": float(v)}
-        for a, v in zip(found.amplitudes, found.conicity, strict=True)
-    ]
+    conicities = zip(map(float, found.amplitudes), map(float, found.conicity), strict=True)
+    data["equivalent_conicity"] = [{"amplitude": a, "value": v} for a, v in conicities]
     data["jumps"] = [{"lateral": lateral, "side": side} for lateral, side in found.geometry.jumps()]
     data |= {"patches": found.patches, "notes": found.notes}
     data["gauge_values"] = gauge_values.records()
@@ -227,10 +225,8 @@ def _write_creep(output: cli.Output, patch: "Patch", rows: Sequence[dict[str, An
     from railsim.plot.creep import creep_curves_figure, traction_figure
     from railsim.table import Column, Table
 
-    fields = {
-        case: exact_force(patch, FIELD_SIZE * patch.unit_creepages(direction))
-        for case, direction in CASES.items()
-    }
+    creepages = {n: FIELD_SIZE * patch.unit_creepages(way) for n, way in CASES.items()}
+    fields = {case: exact_force(patch, given) for case, given in creepages.items()}
     figures = (creep_curves_figure(patch, LAWS), traction_figure(fields, patch.mu * patch.N))
     columns = [Column(name, unit="1/m" if name == "phi" else "") for name in rows[0]]
     for name, content in zip(CREEP, (*figures, Table(columns, rows)), strict=True):

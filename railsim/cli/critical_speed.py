@@ -66,10 +66,8 @@ def command(
     how["methods"] = METHODS[:-1] if method == "all" else tuple(dict.fromkeys(("linear", method)))
     if how["excitations"] is None:
         del how["excitations"]
-    points = [
-        _point(inputs, given, dict(zip(ranges, values, strict=True)))
-        for values in product(*ranges.values())
-    ]
+    each = (dict(zip(ranges, values, strict=True)) for values in product(*ranges.values()))
+    points = [_point(inputs, given, at) for at in each]
     if len(points) > 1:
         _map(points, ranges, how, workers, output)
         return

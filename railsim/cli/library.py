@@ -28,11 +28,8 @@ def command(kinds: tuple[str, ...], draw: str | None, output: cli.Output) -> Non
     from railsim.table import Column, Table
 
     known = [*KINDS, PROFILES, LAWS]
-    Faults(
-        Fault("list", "", f"no kind '{kind}'", nearest(kind, known))
-        for kind in kinds
-        if kind not in known
-    ).check()
+    wrong = (kind for kind in kinds if kind not in known)
+    Faults(Fault("list", "", f"no kind '{one}'", nearest(one, known)) for one in wrong).check()
     entries = [entry for kind in kinds or known for entry in library_entries(kind)]
     if draw is not None:
         _draw(entries, Path(draw), output)

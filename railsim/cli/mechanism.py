@@ -81,13 +81,8 @@ def command(
                         before.result(name)
                 optimum = optimise(chosen, workers=cores, **search)
             results.append(optimum.after if optimum else analyse(mechanism, case))
-            at_values.append(
-                [
-                    {"where": words, **one}
-                    for words, name, value in wanted
-                    for one in results[-1].everywhere(name, value)
-                ]
-            )
+            found = ((words, results[-1].everywhere(name, value)) for words, name, value in wanted)
+            at_values.append([{"where": words, **one} for words, rows in found for one in rows])
             if len(results) == 1 and mechanism.cases and case is None and not searched:
                 cases = {name: _of_case(mechanism, name) for name in mechanism.cases}
                 cases = {"base": results[0], **cases}

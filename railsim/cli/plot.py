@@ -110,11 +110,8 @@ def _study_figure(
     of_summary |= {re.sub(r"_mid(?:1$|(\d+)$)", r"_median\1", name): name for name in known}
     given = [of_summary.get(name, name) for name in selections]
     names = given or [name for name in RANKED if name in known] or list(known)[:4]
-    faults = Faults(
-        Fault("QUANTITY", name, "no such value in the study", nearest(name, known))
-        for name in names
-        if name not in known
-    )
+    wrong, found = (name for name in names if name not in known), "no such value in the study"
+    faults = Faults(Fault("QUANTITY", name, found, nearest(name, known)) for name in wrong)
     first = gathered.results(list(gathered.paths)[:1])
     units = units_of(records, inputs_of(records, first) or used_inputs(folder_of(file)))
     varied = {name: _quantity(column) for name, column in parameters(records, units).items()}
@@ -139,9 +136,7 @@ def _study_figure(
     members = [family] if family else parted or rest[:1]
     early = [record["status"] != "complete" for record in records]
     if kind == "ranking" or x is None:
-        ends = [
-            f" ({record['status']})" * ended for record, ended in zip(records, early, strict=True)
-        ]
+        ends = [f" ({record['status']})" * (record["status"] != "complete") for record in records]
         named = [f"{record['name']}{end}" for record, end in zip(records, ends, strict=True)]
         figure = ranking_figure(quantities, named)
     elif kind == "map":

@@ -168,14 +168,10 @@ class RunLines:
         from railsim.notation import QUANTITIES
 
         texts = []
+        peaks = [peak for record in records for peak in record.get("peaks", ())]
         for name, words in self.SHOWN:
-            found = [
-                peak["value"]
-                for record in records
-                for peak in record.get("peaks", ())
-                if peak["quantity"] == name and peak["kind"] != "min"
-            ]
-            if found:
+            own = (peak for peak in peaks if peak["quantity"] == name and peak["kind"] != "min")
+            if found := [peak["value"] for peak in own]:
                 quantity = QUANTITIES[name]
                 unit = "" if quantity.shown_unit == "-" else f" {quantity.shown_unit}"
                 texts.append(f"{words} {quantity.text(max(found, key=abs))}{unit}")

@@ -94,14 +94,8 @@ def used_inputs(folder: Path) -> "list[Used]":
             cases = plan.cases(list(first.values())[::-1])
     except (RailsimError, OSError):
         return []
-    return [
-        Used(
-            f"{c.labels['vehicle']}",
-            f"{c.labels['track']}",
-            c.vehicle,
-            c.track,
-            c.settings,
-            c.speed,
-        )
-        for c in cases
-    ]
+    found = []
+    for case in cases:
+        names = str(case.labels["vehicle"]), str(case.labels["track"])
+        found.append(Used(*names, case.vehicle, case.track, case.settings, case.speed))
+    return found

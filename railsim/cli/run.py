@@ -54,8 +54,7 @@ def command(
     from railsim.result.extremes import run_facts
     from railsim.result.tables import result_parts
     from railsim.simulation.assumptions import assumptions
-    from railsim.studies.case import of_settings
-    from railsim.studies.run import run_case
+    from railsim.studies.case import of_settings, run_case
 
     keep_freed_memory()
     resume = _opened(before) if before else None

@@ -9,7 +9,7 @@ import click
 
 from railsim.cli import common as cli
 from railsim.cli.terminal import echo, print_json
-from railsim.errors import Fault, Faults, InputError, fault_lines
+from railsim.errors import Faults, fault_lines
 from railsim.files.access import RESULTS, is_file
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
@@ -28,37 +28,24 @@ def command(files: tuple[str, ...], output: cli.Output) -> int:
     Example:
       railsim validate my_coach.toml curve_r250
     """
-    reports = [_report(file) for file in files]
+    reports: list[dict[str, Any]] = []
+    for file in files:
+        faults, kind, remarks = Faults(), "", list[dict[str, str]]()
+        with faults.caught():
+            kind, remarks = checked(file)
+        told = [asdict(fault) | {"text": str(fault)} for fault in faults]
+        reports.append({"file": file, "kind": kind or None, "faults": told, "remarks": remarks})
+        if output.as_json:
+            continue
+        for line in fault_lines(faults):
+            echo(line, err=True)
+        if not (output.quiet or faults):
+            echo(f"{file}: {kind}, no faults")
+            for remark in remarks:
+                echo(f"{file}: {remark['key']}: remark: {remark['text']}")
     if output.as_json:
-        print_json(
-            [
-                one | {"faults": [asdict(fault) | {"text": str(fault)} for fault in one["faults"]]}
-                for one in reports
-            ]
-        )
-    else:
-        for report in reports:
-            _print(report, output.quiet)
+        print_json(reports)
     return cli.WRONG_INPUT if any(report["faults"] for report in reports) else cli.DONE
-
-
-def _report(file: str) -> dict[str, Any]:
-    faults, kind, remarks = list[Fault](), None, list[dict[str, str]]()
-    try:
-        kind, remarks = checked(file)
-    except InputError as error:
-        faults = list(error.faults)
-    return {"file": file, "kind": kind, "faults": faults, "remarks": remarks}
-
-
-def _print(report: dict[str, Any], quiet: bool) -> None:
-    for line in fault_lines(report["faults"]):
-        echo(line, err=True)
-    if quiet or report["faults"]:
-        return
-    echo(f"{report['file']}: {report['kind']}, no faults")
-    for remark in report["remarks"]:
-        echo(f"{report['file']}: {remark['key']}: remark: {remark['text']}")
 
 
 def checked(file: str) -> tuple[str, list[dict[str, str]]]:

@@ -72,18 +72,18 @@ def command(routes: Mix, limits: str, given: cli.Given, **how: Any) -> None:
           --distance 6000 --step 1000 --out worn
     """
     from railsim.definitions.loading import load_wheel_limits
-    from railsim.studies.wear_loop import Route, wear_loop, wear_rows
+    from railsim.studies.wear_loop import wear_loop, wear_rows
 
     inputs = [replace(given, track=track).inputs() for track, _, _ in routes]
-    ways = [Route(one.track, v, share) for one, (_, v, share) in zip(inputs, routes, strict=True)]
-    (coach, _, settings), ends = inputs[0], load_wheel_limits(limits)
-    named = [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways]
-    _remark_on_straights([way.track for way in ways], how["output"])
+    ways = [(one.track, v, share) for one, (_, v, share) in zip(inputs, routes, strict=True)]
+    (coach, track, settings), ends = inputs[0], load_wheel_limits(limits)
+    named = [{"track": way.name, "speed": v, "share": share} for way, v, share in ways]
+    _remark_on_straights([one.track for one in inputs], how["output"])
     _carry_out(
         WHEELS,
         {"vehicle": coach.name, "routes": named},
         partial(wear_loop, coach, ways, limits=ends, settings=settings),
-        lambda found: {"rows": wear_rows(found, coach, ways[0].track)},
+        lambda found: {"rows": wear_rows(found, coach, track)},
         **how,
     )
 
@@ -108,12 +108,12 @@ def rails(traffic: Mix, given: cli.Given, **how: Any) -> None:
       railsim rail-wear curve_r500 --traffic coach_manchester 20 3 --traffic wagon_y25 20 1 \\
           --tonnage 0.1 --step 0.05 --out worn
     """
-    from railsim.studies.rail_wear import Traffic, rail_rows, rail_wear
+    from railsim.studies.rail_wear import rail_rows, rail_wear
 
     inputs = [replace(given, vehicle=vehicle).inputs() for vehicle, _, _ in traffic]
-    mix = [Traffic(i.vehicle, v, share) for i, (_, v, share) in zip(inputs, traffic, strict=True)]
+    mix = [(one.vehicle, v, share) for one, (_, v, share) in zip(inputs, traffic, strict=True)]
     _, worn, settings = inputs[0]
-    named = [{"vehicle": t.vehicle.name, "speed": t.speed, "share": t.share} for t in mix]
+    named = [{"vehicle": coach.name, "speed": v, "share": share} for coach, v, share in mix]
     record = {"track": worn.name, "traffic": named}
     _remark_on_straights([worn], how["output"])
     _carry_out(RAILS, record, partial(rail_wear, worn, mix, settings=settings), rail_rows, **how)

@@ -71,22 +71,16 @@ def _result(result: "Result") -> Description:
         }
         for name, quantity in result.quantities.items()
     }
-    data = {
-        "kind": "result",
-        "attributes": attributes,
-        "remarks": list(result.remarks),
-        "coordinates": coordinates,
-        "quantities": quantities,
-    }
-    rows = [
-        [name, ", ".join(q["dims"]), " x ".join(map(str, q["shape"])), q["unit"]]
-        for name, q in quantities.items()
-    ]
+    remarks = list(result.remarks)
+    data = {"kind": "result", "attributes": attributes, "remarks": remarks}
+    data |= {"coordinates": coordinates, "quantities": quantities}
+    each = ((name, *q.values()) for name, q in quantities.items())
+    rows = [[n, ", ".join(dims), " x ".join(map(str, size)), unit] for n, dims, size, unit in each]
     return Description(
         data,
         [
             *(f"{name:18} {value}" for name, value in attributes.items()),
-            *(f"{'remark':18} {remark}" for remark in result.remarks),
+            *(f"{'remark':18} {remark}" for remark in remarks),
             "",
             *(f"{name:18} {', '.join(labels)}" for name, labels in coordinates.items()),
             "",

@@ -92,10 +92,8 @@ def _track_lines(track: Track, data: dict[str, Any]) -> list[str]:
         lines.append(f"  friction with slip down to {falling.rest:g} of it, {falling.decay:g} s/m")
     if track.third_body != (1.0, 1.0):
         lines.append(f"  third body: Kalker's coefficients times {either(track.third_body)}")
-    lines += [
-        "  {rail} rail of {number} sections from s = {begin:g} to {end:g} m".format(**part)
-        for part in data["sections"]
-    ]
+    words = "  {rail} rail of {number} sections from s = {begin:g} to {end:g} m"
+    lines += [words.format(**part) for part in data["sections"]]
     for part in data["check_rail"]:
         along = "from s = {begin:g} to {end:g} m" if part["begin"] > -FAR else "all along"
         least = f"flangeway {1e3 * part['flangeway']:g} mm at least"
@@ -122,14 +120,9 @@ def _irregularity(part: Irregularity) -> dict[str, Any]:
     if isinstance(part, Measured) and part.rows is not None:
         column, at_rows, between, _ = largest_between_rows(part)
         data = {key: value for key, value in data.items() if key not in READING}
-        data |= {
-            "number": len(part.rows),
-            "first": part.rows[0][0] + part.shift,
-            "last": part.rows[-1][0] + part.shift,
-            "column": column,
-            "largest_at_rows": at_rows,
-            "largest_between_rows": between,
-        }
+        first, last = (part.rows[k][0] + part.shift for k in (0, -1))
+        known = len(part.rows), first, last, column, at_rows, between
+        data |= dict(zip(ROWS, known, strict=True))
     return data
 
 
@@ -146,12 +139,8 @@ def _values(part: dict[str, Any]) -> str:
 
 
 def _row(section: Section) -> dict[str, Any]:
-    return {
-        "type": section.type,
-        "begin": section.begin,
-        "end": section.end,
-        "values": (section.start_value, section.end_value),
-    }
+    values = section.start_value, section.end_value
+    return {"type": section.type, "begin": section.begin, "end": section.end, "values": values}
 
 
 def _plan_row(

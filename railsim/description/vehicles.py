@@ -64,11 +64,8 @@ def describe_vehicle(vehicle: Vehicle) -> Description:
         cases = ", ".join(vehicle.loads)
         parts.append(f"  load case: {vehicle.load or 'design'}; also defined: {cases}")
     lines = _element_rows(vehicle)
-    columns = [
-        *map(Column, ("element", "kind")),
-        Column("number", format="<d"),
-        *map(Column, ("between", "values")),
-    ]
+    number = Column("number", format="<d")
+    columns: list[Column | str] = ["element", "kind", number, "between", "values"]
     parts += ["", _body_table(bodies)]
     if lines:
         parts += ["", Table(columns, lines)]

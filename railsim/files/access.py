@@ -16,10 +16,10 @@ import stat
 import tempfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from itertools import chain, count
 from pathlib import Path
-from typing import BinaryIO, Self
+from typing import BinaryIO
 
 from railsim.errors import InputError, argument_error, input_error
 from railsim.text import LONGEST_FILE, shortened
@@ -75,7 +75,6 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
     a file or called like one, cannot be written to, holds a folder where a file is to be written or
     the reverse, or one of `names` and not `overwrite`.
     """
-    names = tuple(names)
     found, allowed = _invalid_name(folder), "choose another name"
     if found:
         pass
@@ -85,17 +84,15 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
         found, allowed = f"{folder.name} is the name of a file", "give the name of a folder"
     elif found := _unwritable(folder):
         allowed = "choose another folder"
-    elif unlike := [
-        name
-        for name in names
-        if (folder / name).exists() and (folder / name).is_dir() != name.endswith("/")
-    ]:
-        found = f"{folder / unlike[0]} is a {'file' if unlike[0].endswith('/') else 'folder'}"
-        allowed = "rename it, or choose another folder"
-    elif not overwrite and (
-        there := [n for n in names if not n.endswith("/") and (folder / n).exists()]
-    ):
-        found, allowed = f"{folder} holds {', '.join(there)}", "give `overwrite` or another folder"
+    else:
+        there = [name for name in names if (folder / name).exists()]
+        unlike = [name for name in there if (folder / name).is_dir() != name.endswith("/")]
+        files = ", ".join(name for name in there if not name.endswith("/"))
+        if unlike:
+            found = f"{folder / unlike[0]} is a {'file' if unlike[0].endswith('/') else 'folder'}"
+            allowed = "rename it, or choose another folder"
+        elif files and not overwrite:
+            found, allowed = f"{folder} holds {files}", "give `overwrite` or another folder"
     _refuse(found, allowed, parameter="out")
 
 
@@ -232,7 +229,7 @@ def read_text(path: str | Path, limit: int) -> str:
 # writing ------------------------------------------------------------------------------------------
 
 
-class PartialFile:
+class PartialFile(AbstractContextManager["PartialFile"]):
     """A file under a hidden name, to be written and then to get its own.
 
     Left without `finish` it disappears.  As long as it exists, this process holds a lock on it.
@@ -299,9 +296,6 @@ class PartialFile:
         if self._handle >= 0:
             os.close(self._handle)
             self._handle = -1
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.remove()

@@ -126,10 +126,8 @@ def _parquet(path: Path, wanted: Wanted, _: MeasurementFile) -> Iterator[Piece]:
         _named(path, wanted, file.schema_arrow.names)
         theirs = list(dict.fromkeys(column for column, _ in wanted.values()))
         for batch in file.iter_batches(ROWS, columns=theirs):
-            yield {
-                name: np.array(batch.column(column).cast("float64"), dtype=np.float64)
-                for name, (column, _) in wanted.items()
-            }
+            own = {n: batch.column(column).cast("float64") for n, (column, _) in wanted.items()}
+            yield {name: np.array(column, dtype=np.float64) for name, column in own.items()}
     except InputError:
         raise
     except Exception as error:  # pyarrow's own errors have no common base

@@ -240,13 +240,10 @@ def _mounted(
     as zero acceleration; of gravity a high pass leaves nothing.
     """
     found = dict(values)
+    by_quantity = {how.channels[name].quantity: name for name in values}
     for point, angles in how.mounting.items():
-        names = {
-            axis: name
-            for name in values
-            for axis in "xyz"
-            if how.channels[name].quantity == f"sensor_acceleration:{point}:{axis}"
-        }
+        quantities = {axis: f"sensor_acceleration:{point}:{axis}" for axis in "xyz"}
+        names = {axis: by_quantity[q] for axis, q in quantities.items() if q in by_quantity}
         if not names:
             allowed = "a point with channels of sensor_acceleration"
             raise input_error(path, "no channel there", allowed, key=f"mounting.{point}")

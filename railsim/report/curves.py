@@ -33,11 +33,8 @@ def groups(results: Mapping[str, Result]) -> list[dict[str, Result]]:
         if len(result["time"]) < 2:
             continue
         track = result.track()
-        key = (
-            track.name,
-            *((s.type, s.begin, s.end, s.start_value) for s in curvature_sections(track)),
-        )
-        found.setdefault(key, {})[name] = result
+        plan = ((s.type, s.begin, s.end, s.start_value) for s in curvature_sections(track))
+        found.setdefault((track.name, *plan), {})[name] = result
     return list(found.values())
 
 
@@ -131,13 +128,10 @@ def thinned(axis: Floats, values: Floats, edges: Floats) -> Floats:
         )
         found[2 * filled] = np.where(low_at < high_at, low, high)
         found[2 * filled + 1] = np.where(low_at < high_at, high, low)
-    for cell in np.flatnonzero(starts[1:] == starts[:-1]):
-        for row, share in ((2 * cell, 0.25), (2 * cell + 1, 0.75)):
-            at_x = edges[cell] + share * (edges[cell + 1] - edges[cell])
-            if axis[0] <= at_x <= axis[-1]:
-                after = max(1, int(np.searchsorted(axis, at_x)))
-                part = (at_x - axis[after - 1]) / (axis[after] - axis[after - 1])
-                found[row] = (1.0 - part) * values[after - 1] + part * values[after]
+    empty = np.flatnonzero(starts[1:] == starts[:-1])
+    for rows, share in ((2 * empty, 0.25), (2 * empty + 1, 0.75)):
+        at = edges[empty] + share * (edges[empty + 1] - edges[empty])
+        found[rows] = np.transpose([np.interp(at, axis, x, np.nan, np.nan) for x in values.T])
     return found
 
 
@@ -154,8 +148,6 @@ def coded(values: Floats) -> tuple[float, float, str]:
 
 def cells_of(found: Sequence[Mapping[str, Result]]) -> int:
     """Return the number of cells of all curves for which the page stays small."""
-    lines = sum(
-        len(results) * max(len(result.wheelsets) for result in results.values()) * 9
-        for results in found
-    )
+    each = ([len(result.wheelsets) for result in results.values()] for results in found)
+    lines = 9 * sum(len(numbers) * max(numbers) for numbers in each)
     return max(50, min(CELLS, MOST_VALUES // max(1, 2 * lines)))

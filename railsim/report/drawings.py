@@ -122,10 +122,8 @@ def track_svg(track: Track) -> str:
     """Draw curvature and cant of a track over its length, curves shaded and labelled."""
     alignment = Alignment(track)
     s = np.linspace(0.0, track.length, POINTS + 1)
-    lines = (
-        ("curvature", 1e3 * alignment.curvature(s), "1/km"),
-        ("cant", 1e3 * alignment.cant(s), "mm"),
-    )
+    curvature, cant = 1e3 * alignment.curvature(s), 1e3 * alignment.cant(s)
+    lines = ("curvature", curvature, "1/km"), ("cant", cant, "mm")
     drawn = [line for line in lines if line[1].any()]
     width, height = 1000.0, 78.0
     below = height + 16.0  # where the second begins, below the line with the radii

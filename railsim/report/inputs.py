@@ -103,11 +103,10 @@ def what_was_run(
         kinds = [kind.replace("_", " ") for kind in element_kinds(vehicle)]
         section.drawings.append(Drawing(name, words, Markup(vehicle_svg(vehicle)), kinds))
     for name, variants in tracks.items():
-        rails = ", ".join(dict.fromkeys(_rails(track) for track in variants))
+        presets = dict.fromkeys(track.support.preset for track in variants)
+        rails = ", ".join(one if one == "rigid" else f"elastic ({one})" for one in presets)
         friction = ", ".join(dict.fromkeys(track.friction_words for track in variants))
-        unusual = dict.fromkeys(
-            str(remark) for track in variants for remark in track_remarks(track)
-        )
+        unusual = dict.fromkeys(str(one) for track in variants for one in track_remarks(track))
         words = f"{_named(variants[0], name)}Friction {friction}; rails {rails}."
         words += f" Remarks: {'; '.join(unusual)}." if unusual else ""
         section.drawings.append(Drawing(name, words, Markup(track_svg(variants[0]))))
@@ -169,11 +168,6 @@ def _number(value: Any) -> Any:
         if isinstance(value, str) and number_with_unit(value) is None:
             return number(value)
     return value
-
-
-def _rails(track: Track) -> str:
-    preset = track.support.preset
-    return "rigid" if preset == "rigid" else f"elastic ({preset})"
 
 
 def _differences(vehicles: Mapping[str, Any]) -> Table:

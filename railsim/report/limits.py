@@ -1,7 +1,7 @@
 """Tables of the values of runs with the limits of standards and the meaning of each limit."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -136,7 +136,7 @@ def _reasons(one: Assessment) -> Table:
 
 def _conditions(one: Assessment) -> Table:
     rows = [
-        [c.place or "all runs", c.name, c.state, c.found, c.required, _origin(c.source, c.checked)]
+        [c.place or "all runs", c.name, c.state, c.found, c.required, _origin(c)]
         for c in one.conditions
     ]
     header = ["", "condition", "", "found", "required", "requirement from"]
@@ -194,7 +194,7 @@ def _rows(one: Assessment) -> list[Table]:
                 else "", text(line.error) if line else "", text(e.value, row.limit),
                 text(row.uncorrected.value) if row.uncorrected else "",
                 text(row.limit) if bounded else "none",
-                _origin(row.source, row.checked) if bounded else "for information",
+                _origin(row) if bounded else "for information",
             ])  # fmt: skip
         if not rows:
             continue  # no section counts; the reasons are among the conditions
@@ -258,7 +258,7 @@ def _off(distance: float, on: str, back: str) -> str:
 def _sources(limits: Any) -> Table:
     """Return where the number of each limit is from."""
     rows = [
-        [one.words, WORDS[one.group], one.meaning, _origin(law.source, law.checked)]
+        [one.words, WORDS[one.group], one.meaning, _origin(law)]
         for one in CRITERIA.values()
         if (law := limits.limits.get(one.name)) is not None
     ]
@@ -266,8 +266,8 @@ def _sources(limits: Any) -> Table:
     return Table(header, rows, f"Limits of {limits.edition}", range(4))
 
 
-def _origin(source: str, checked: bool) -> str:
-    return source if checked or source == "ours" else f"{source}, unchecked"
+def _origin(of: Any) -> str:
+    return of.source if of.checked or of.source == "ours" else f"{of.source}, unchecked"
 
 
 def _gathered(remarks: Sequence[str], runs: Mapping[str, Result]) -> list[str]:
@@ -302,7 +302,9 @@ def _zones(assessments: Sequence[Assessment]) -> list[Table]:
             if any(pair and pair[1].exceeded for pair in own):
                 failed.append(len(rows))
             words = first.criterion.words, first.criterion.meaning
-            rows.append([words, *map(_cell, own), _joined(limits)])
+            values, sources = zip(*limits, strict=True)
+            limit = " / ".join(values), " / ".join(dict.fromkeys(sources))
+            rows.append([words, *map(_cell, own), limit])
         own_zones = [z for one in assessments for z in one.zones if z.zone == name]
         counts = sorted({len(zone.values) for zone in own_zones})
         number = " to ".join(dict.fromkeys(str(n) for n in (counts[0], counts[-1])))
@@ -312,12 +314,6 @@ def _zones(assessments: Sequence[Assessment]) -> list[Table]:
         header = ["", *map(printable, worst), "limit"]
         tables.append(Table(header, rows, caption, failed=failed, note=NOTE))
     return [*(replace(table, note="") for table in tables[:-1]), *tables[-1:]]
-
-
-def _joined(limits: Iterable[tuple[str, str]]) -> Cell:
-    """Limits of several vehicles, with where they are from."""
-    values, sources = zip(*limits, strict=True)
-    return " / ".join(values), " / ".join(dict.fromkeys(sources))
 
 
 def _cell(pair: tuple[ZoneReport, Row] | None) -> Cell:
@@ -336,7 +332,7 @@ def _cell(pair: tuple[ZoneReport, Row] | None) -> Cell:
 
 def _limit(row: Row) -> tuple[str, str]:
     unit = row.criterion.unit.replace("-", "")
-    return f"{row.criterion.text(row.limit)} {unit}", _origin(row.source, row.checked)
+    return f"{row.criterion.text(row.limit)} {unit}", _origin(row)
 
 
 def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:

@@ -157,10 +157,8 @@ def _compared(collected: Collected) -> dict[str, Analysis]:
 def positions(result: Analysis) -> bytes:
     """All results at all positions as CSV; the header names quantity and unit."""
     definition = result.definition
-    columns = {
-        f"{name} [{quantity(name, definition).si_unit or 1}]": values
-        for name, values in result.output.items()
-    }
+    units = {name: quantity(name, definition).si_unit or 1 for name in result.output}
+    columns = {f"{name} [{units[name]}]": values for name, values in result.output.items()}
     unit = quantity("travel", definition).si_unit
     for courses, value, of in _courses(result.motion):
         rates = f"{value} first [{of}/{unit}]", f"{value} second [{of}/{unit}2]"
@@ -192,11 +190,8 @@ def _courses(motion: Any) -> tuple[tuple[dict[str, Course], str, str], ...]:
 
 def _columns(courses: Mapping[str, Course], *headers: str) -> dict[str, Any]:
     """Columns of angles or lengths with two derivatives, by their headers."""
-    return {
-        f"{name} {header}": values
-        for name, course in courses.items()
-        for header, values in zip(headers, vars(course).values(), strict=True)
-    }
+    each = ((name, zip(headers, vars(one).values(), strict=True)) for name, one in courses.items())
+    return {f"{name} {header}": values for name, own in each for header, values in own}
 
 
 def _csv(columns: Mapping[str, Any]) -> bytes:
@@ -276,10 +271,8 @@ def _sentences(result: Analysis, s: Any) -> list[str]:
     """Text of the player at each position."""
     order = np.argsort(result.output["travel"])
     columns = [quantity(n, result.definition) for n in ("height", "force") if n in result.output]
-    known = [
-        np.interp(s, result.output["travel"][order], result.output[c.name][order]) * c.scale
-        for c in columns
-    ]
+    travel, *known = (result.output[name][order] for name in ("travel", *(c.name for c in columns)))
+    known = [np.interp(s, travel, x) * c.scale for c, x in zip(columns, known, strict=True)]
     found = []
     for k, value in enumerate(s):
         words = [f"{c.name} {x[k]:.0f} {c.unit}" for c, x in zip(columns, known, strict=True)]
@@ -301,20 +294,17 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
     compared = shown("comparison", "comparison_held", "comparison_zone")
     if (optimum := collected.optimum) is not None:
         found = tables.optimum_sentences(optimum), tables.optimum_tables(optimum)
-        sections += [
-            Section("Search", *found, shown("search")),
-            Section("Before and after the search", drawings=compared),
-        ]
+        sections.append(Section("Search", *found, shown("search")))
+        sections.append(Section("Before and after the search", drawings=compared))
     if len(collected.results) > 1:
         compared += shown(*(name for name in drawn if name.startswith("drawing_")))
         rows = [tables.comparison_table(collected.results)]
         sections.append(Section("Comparison", [], rows, compared))
     kinematics = shown("kinematics", "actuators", "angles", "cam")
     forces = ("ratio_force", "pressure", "carpet", "contact", "gas_springs", "cases", "time")
-    sections += [
-        Section("Kinematics", drawings=kinematics),
-        Section("Forces and motion", [], [tables.reaction_table(result)], shown(*forces)),
-    ]
+    rows = [tables.reaction_table(result)]
+    sections.append(Section("Kinematics", drawings=kinematics))
+    sections.append(Section("Forces and motion", [], rows, shown(*forces)))
     if choices := selection(result):
         sections.append(Section("Selection", [], [tables.selection_table(choices)]))
     if definition.tolerances:

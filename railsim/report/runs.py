@@ -72,7 +72,7 @@ def page(
     peaks = any(record["name"] in results for record in _done(records))
     used = inputs_of(records, every) or list(used)
     units = units_of(records, used[:MOST_UNITS])
-    few, analysed = len(records) < spread.LEAST, any(map(_own_values, records))
+    few, analysed = len(records) < spread.LEAST, any(one.get("quantities") for one in records)
     sections = [_peaks(records, results)] if peaks or (few and not analysed) else []
     sections += [_assessed(one) for one in assessments if one.standard not in RUNNING]
     if len(_done(records)) > max(spread.LEAST, len(results)):
@@ -99,13 +99,8 @@ def page(
     )  # fmt: skip
 
 
-def _own_values(record: Record) -> Any:
-    """Values of analyses and of functions of the user."""
-    return record.get("quantities")
-
-
 def _done(records: Sequence[Record]) -> list[Record]:
-    return [record for record in records if record.get("peaks") or _own_values(record)]
+    return [record for record in records if record.get("peaks") or record.get("quantities")]
 
 
 def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:

@@ -41,7 +41,10 @@ def parameters(
         values = [record["labels"].get(name, "") for record in records]
         if len(set(map(str, values))) > 1:
             unit = "m/s" if name == "speed" else (units or {}).get(name, "")
-            words = _short(name, names)
+            parts = name.split(".")
+            # of a vehicle also the part that has the value: `guide.stiffness.x`, `carbody.mass`
+            least = 1 + (parts[0] == "vehicle") + (parts[-1] in AXES or parts[-1].isdecimal())
+            words = telling_end(name, names, least)
             found[name] = {"words": words, "unit": unit, "values": _numbers(values)}
     return found
 
@@ -63,13 +66,6 @@ def number(value: Any) -> float:
         raise ValueError(value)
     in_si = number_with_unit(str(value))  # None without a unit
     return float(value) if in_si is None else in_si
-
-
-def _short(name: str, names: Sequence[str]) -> str:
-    parts = name.split(".")
-    # of a vehicle also the part that has the value: `guide.stiffness.x`, `carbody.mass`
-    least = 1 + (parts[0] == "vehicle") + (parts[-1] in AXES or parts[-1].isdecimal())
-    return telling_end(name, names, least)
 
 
 def command(record: Record, inputs: Mapping[str, Any]) -> str:

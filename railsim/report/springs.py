@@ -154,13 +154,10 @@ def page(results: Collected, figures: Mapping[str, bytes]) -> str:
         sections.append(Section("Design", [text], designed, shown("coils")))
     cases = [tables.load_table(suspension), tables.case_table(verification)]
     listed = [tables.sheet_table(sheets), tables.loaded_table(sheets)]
+    told = [] if suspension.fatigue else [tables.NO_FATIGUE]
     sections += [
         Section("Load cases", [], cases, shown("stiffness", "deflection", "arm")),
-        Section(
-            "Checks",
-            [] if suspension.fatigue else [tables.NO_FATIGUE],
-            [check_table(verification.checks, notes=True)],
-        ),
+        Section("Checks", told, [check_table(verification.checks, notes=True)]),
         Section("Data sheets of the springs", [SHEETS], listed),
     ]
     if results.fatigue is not None:

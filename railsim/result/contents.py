@@ -6,6 +6,7 @@ places anew at each access, and the digest's, which read everything again.
 
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -22,36 +23,33 @@ NOTHING: Values = MappingProxyType({})
 Shape = tuple[int, ...]
 
 
+@dataclass
 class Dataset:
-    """A dataset that is being written.
+    """A dataset that is being written."""
 
-    `place`: HDF5's identifier. `dtype`: Type of its numbers. `attributes`: Those that it has.
-    """
-
-    def __init__(self, place: h5d.DatasetID, dtype: np.dtype[Any], attributes: Values) -> None:
-        self.place = place
-        self._dtype = dtype
-        self._attributes = attributes
-        self._crc = 0
+    place: h5d.DatasetID  # HDF5's identifier
+    dtype: np.dtype[Any]
+    attributes: Values
+    crc: int = 0  # CRC-32 of what is written
 
     def write(self, array: np.ndarray[Any, Any]) -> None:
         """Write all values."""
         self.place.write(h5s.ALL, h5s.ALL, array)
-        self._crc = zlib.crc32(array.tobytes())
+        self.crc = zlib.crc32(array.tobytes())
 
     def append(self, rows: Floats) -> None:
         """Write further rows of a dataset that may grow."""
-        rows = np.ascontiguousarray(rows, dtype=self._dtype)
+        rows = np.ascontiguousarray(rows, dtype=self.dtype)
         begin, *inner = self.place.shape
         self.place.set_extent((begin + len(rows), *inner))
         space = self.place.get_space()
         space.select_hyperslab((begin, *(0 for _ in inner)), rows.shape)
         self.place.write(h5s.create_simple(rows.shape), space, rows)
-        self._crc = zlib.crc32(rows.data, self._crc)
+        self.crc = zlib.crc32(rows.data, self.crc)
 
     def facts(self) -> Facts:
         """Return what the digest covers."""
-        return Facts(self._dtype.str, self.place.shape, self._crc, self._attributes)
+        return Facts(self.dtype.str, self.place.shape, self.crc, self.attributes)
 
 
 class Contents:

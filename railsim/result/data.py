@@ -119,7 +119,8 @@ class Result:
     def __getattr__(self, name: str) -> Floats:
         if not name.startswith("_") and (name in self._arrays or name in self._coordinates):
             return self[name]
-        raise AttributeError(f"a result has no '{name}'; {nearest(name, self._names())}")
+        known = (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")
+        raise AttributeError(f"a result has no '{name}'; {nearest(name, known)}")
 
     def __contains__(self, name: object) -> bool:
         return name in self._arrays
@@ -165,11 +166,8 @@ class Result:
         """Return what a notebook shows: the run, its wheel forces, and what the result holds."""
         facts = {"status": "", "status_reason": "", "speed": "m/s", "start": "m", "duration": "s",
                  "step": "s", "cpu_time": "s"}  # fmt: skip
-        rows = [
-            [name, f"{value:.6g} {unit}" if unit else value]
-            for name, unit in facts.items()
-            if (value := self._attributes.get(name, "")) != ""
-        ]
+        known = ((name, self._attributes.get(name, ""), unit) for name, unit in facts.items())
+        rows = [[name, f"{x:.6g} {unit}" if unit else x] for name, x, unit in known if x != ""]
         rows += [["remark", remark] for remark in self.remarks]
         held = [[q.name, q.long_name, q.unit, ", ".join(q.dims)] for q in self._quantities.values()]
         columns = ["name", "quantity", "unit", "dimensions"]
@@ -177,9 +175,6 @@ class Result:
         forces = {"Q", "Y", "distance"} <= set(self) and len(self["time"]) > 1
         picture = image_tag(self.plot("Q", "Y")) if forces else ""
         return f"{run.html()}{picture}{Table(columns, held).html()}"
-
-    def _names(self) -> tuple[str, ...]:
-        return (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")
 
     def part(self, name: str, rows: slice) -> Floats:
         """Return some instants of a quantity; of a file that is not read yet only these are read.

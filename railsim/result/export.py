@@ -117,11 +117,8 @@ def selected(
     instants = time[rows]
     if rate is not None and len(rows):
         if (number := rate * (instants[-1] - instants[0])) > MOST_INSTANTS:
-            found, allowed = (
-                f"{rate:g} per s: {number:.3g} instants",
-                f"{MOST_INSTANTS:.0e} at most",
-            )
-            raise argument_error("rate", found, allowed, option="--rate")
+            found = f"{rate:g} per s: {number:.3g} instants"
+            raise argument_error("rate", found, f"{MOST_INSTANTS:.0e} at most", option="--rate")
         instants = np.arange(instants[0], instants[-1] + 1e-9, 1.0 / rate)
     arrays = {}
     for name, quantity in chosen.items():

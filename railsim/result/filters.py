@@ -114,13 +114,9 @@ def _continued(x: Floats, begin: int, end: int) -> Floats:
     if len(inner) == end - begin:
         return inner
     before, after = np.arange(begin, 0), np.arange(last + 1, end)
-    return np.concatenate(
-        [
-            2.0 * x[:1].astype(np.float64) - x[np.minimum(-before, last)],
-            inner,
-            2.0 * x[last:].astype(np.float64) - x[np.maximum(2 * last - after, 0)],
-        ]
-    )
+    first, end_value = (2.0 * part.astype(np.float64) for part in (x[:1], x[last:]))
+    rest = end_value - x[np.maximum(2 * last - after, 0)]
+    return np.concatenate([first - x[np.minimum(-before, last)], inner, rest])
 
 
 def even_step(time: Floats) -> float | None:

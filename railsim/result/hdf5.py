@@ -298,10 +298,8 @@ def _about_peak(name: str) -> tuple[Values, Sequence[str]]:
 
 
 def _write_profile(contents: Contents, name: str, profile: Profile) -> None:
-    about: dict[str, str | float] = {
-        "units": "m",
-        "long_name": f"{profile.kind} profile {profile.name}: y, z",
-    }
+    words = f"{profile.kind} profile {profile.name}: y, z"
+    about: dict[str, str | float] = {"units": "m", "long_name": words}
     about |= {fact: getattr(profile, fact) for fact in ("name", "kind", "source", "inclination")}
     about["notes"] = "\n".join(profile.notes)
     points = np.column_stack([profile.y, profile.z])

@@ -34,11 +34,8 @@ def all_labels(
     dims: Sequence[str], coordinates: Mapping[str, Sequence[str]]
 ) -> dict[str, tuple[str, str]]:
     """Return dimension and name of all texts that name a place along some dimensions."""
-    return {
-        label: (dim, coordinates[dim][index])
-        for dim in dims
-        for label, index in known_labels(dim, coordinates[dim]).items()
-    }
+    each = ((dim, coordinates[dim], known_labels(dim, coordinates[dim])) for dim in dims)
+    return {label: (dim, names[k]) for dim, names, known in each for label, k in known.items()}
 
 
 def chosen_names(

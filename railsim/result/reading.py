@@ -11,6 +11,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -131,7 +132,6 @@ class _Recent:
         self._bytes = 0
 
     def add(self, array: Floats) -> None:
-        """Hold on to an array, and let go of the oldest ones."""
         self._arrays.append(array)
         self._bytes += array.nbytes
         while self._bytes > self.most and len(self._arrays) > 1:
@@ -191,10 +191,7 @@ def _stamp(facts: os.stat_result) -> tuple[int, ...]:
 
 
 def _refuse_another(path: Path, file: h5py.File, stamp: tuple[int, ...]) -> None:
-    """Refuse a file that has taken the place of the one with the stamp, or was changed.
-
-    Raises InputError: it is another.
-    """
+    """Refuse a file that has taken the place of the one with the stamp, or was changed."""
     if _stamp(os.fstat(file.id.get_vfd_handle())) != stamp:
         raise input_error(path, "was replaced or changed after it was opened", "open it again")
 
@@ -238,14 +235,14 @@ class _Dataset(NamedTuple):
         return h5py.Dataset(self.place)
 
 
+@dataclass
 class _Reader:
     """Looks at every member of an open file before it is read."""
 
-    def __init__(self, file: h5py.File, path: Path, stamp: tuple[int, ...]) -> None:
-        self._file = file
-        self._path = path
-        self._stamp = stamp
-        self._declared = 0  # bytes that arrays say they have
+    _file: h5py.File
+    _path: Path
+    _stamp: tuple[int, ...]
+    _declared: int = 0  # bytes that arrays say they have
 
     def fault(self, name: str, found: str, allowed: str = AS_WRITTEN) -> InputError:
         return input_error(self._path, found, allowed, name)
@@ -278,10 +275,8 @@ class _Reader:
             facts["remarks"] = "\n".join(dict.fromkeys(remarks))
         datasets = {name: each for name, each in members.items() if name not in groups}
         coordinates, quantities = self._described(datasets)
-        profiles = {
-            unquote(key): self._profile(f"profiles/{key}", dataset)
-            for key, dataset in inner.pop("profiles", {}).items()
-        }
+        stored_profiles = inner.pop("profiles", {}).items()
+        profiles = {unquote(k): self._profile(f"profiles/{k}", one) for k, one in stored_profiles}
         arrays: dict[str, dict[str, Floats]] = {}
         for group, some in inner.items():
             numbers = {key: each for key, each in some.items() if not each.is_text}

@@ -123,7 +123,9 @@ class MemorySink(Sink):
         """See `Sink.begin`."""
         self._quantities = {q.name: q for q in quantities if matches(q.name, self._only)}
         self._coordinates = full_coordinates(coordinates)
-        self._chunks = {name: [] for name in timed(self._quantities)}
+        for name in timed(self._quantities):
+            shape = (len(self._coordinates[dim]) for dim in self._quantities[name].dims[1:])
+            self._chunks[name] = [np.zeros((0, *shape))]
 
     def append(self, chunk: Mapping[str, Floats]) -> None:
         """See `Sink.append`."""
@@ -138,10 +140,8 @@ class MemorySink(Sink):
         groups: Mapping[str, Mapping[str, Any]] = NOTHING,
     ) -> Result:
         """See `Sink.close`."""
-        arrays = {}
-        for name in [*self._chunks]:
-            chunks = self._chunks.pop(name)  # one after the other: not everything twice
-            arrays[name] = np.concatenate(chunks) if chunks else np.zeros((0, *self._shape(name)))
+        # one after the other: not everything twice
+        arrays = {name: np.concatenate(self._chunks.pop(name)) for name in [*self._chunks]}
         arrays |= {name: statics[name] for name in self._quantities if name not in arrays}
         facts = root_attributes(self._attributes, attributes)
         return Result(arrays, self._quantities, self._coordinates, facts, profiles, groups)
@@ -149,9 +149,6 @@ class MemorySink(Sink):
     def abort(self) -> None:
         """See `Sink.abort`."""
         self._chunks = {}
-
-    def _shape(self, name: str) -> tuple[int, ...]:
-        return tuple(len(self._coordinates[dim]) for dim in self._quantities[name].dims[1:])
 
 
 def full_coordinates(coordinates: Mapping[str, Sequence[str]]) -> dict[str, tuple[str, ...]]:

@@ -2,10 +2,9 @@
 
 ==================== ========================================================================
 `spec.py`            `RunSpec`, `StudySpec`, `Execution`: what is asked for, by whomever
-`case.py`            `Case`: all inputs of one run, loaded, with its name and its key
+`case.py`            `Case`: all inputs of one run, loaded, with its name and its key; its run
 `rows.py`            values of grids, linked keys and samples
 `plan.py`            `Plan`: from a study to points and cases; all faults are reported together
-`run.py`             run of a case, to a file
 `execute.py`         cases over processes or a dask cluster
 `records.py`         records of finished work as JSON, with checksums
 `journal.py`         finished runs, one line per run, appended

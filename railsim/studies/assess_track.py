@@ -205,11 +205,9 @@ def assess_track(
     begin, end = _extent(track)
     count = max(1, round((end - begin) / PIECE))
     edges = np.linspace(begin, end, count + 1)
-    outputs: Any = {
-        "low_pass": {"frequency": STORED},
-        "quantities": ["Q", "Y", "Y_over_Q", "wheelset_distance"],
-        "sensors": "readings",
-    }
+    quantities = ["Q", "Y", "Y_over_Q", "wheelset_distance"]
+    outputs: Any = {"low_pass": {"frequency": STORED}, "sensors": "readings"}
+    outputs["quantities"] = quantities
     settings = Settings(output_rate=RATE, outputs=outputs)
     runs: list[_Run] = []
     behind = {name: _behind(vehicle) for name, vehicle in tested.items()}
@@ -226,14 +224,11 @@ def assess_track(
                 runs.append(_Run(case, a, b, moved))
     spec = StudySpec(
         vehicles=[str(v) for v in vehicles], tracks=[str(recording)], speeds=list(speeds),
-        single=True, keep="Q,Y,Y_over_Q,wheelset_distance,sensor_acceleration",
+        single=True, keep=",".join([*quantities, "sensor_acceleration"]),
     )  # fmt: skip
     outcome = carry_out_cases([run.case for run in runs], spec, folder, **how)
-    remarks = [
-        f"{record['name']}: {record['status']}, {record['status_reason']}"
-        for record in outcome.records
-        if record["status"] != "complete"
-    ]
+    ended = outcome.records.where(lambda status: status != "complete")
+    remarks = [f"{one['name']}: {one['status']}, {one['status_reason']}" for one in ended]
     remarks += _left_out(track) + _hunting(outcome.records) + measured_remarks(track)
     return _judged(track, runs, share, outcome, remarks)
 
@@ -250,15 +245,6 @@ def _hunting(records: Sequence[Mapping[str, Any]]) -> list[str]:
         "it exceeds there is due to the vehicle, and where a piece begins it need not hunt yet."
         for (vehicle, speed), hunts in runs.items()
         if any(hunts)
-    ]
-
-
-def _lifting(unloaded: Mapping[tuple[str, float], Sequence[float]]) -> list[str]:
-    """Remark on wheels without load, by vehicle and speed, and where the first one is so [m]."""
-    return [
-        f"{vehicle} lifts a wheel at {3.6 * speed:.0f} km/h, first at s = {min(s):.0f} m: Y/Q has "
-        "no value there, and its sections are flagged."
-        for (vehicle, speed), s in unloaded.items()
     ]
 
 
@@ -324,11 +310,8 @@ def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
     parts: list[Any] = []
     for part in track.irregularities:
         if isinstance(part, Measured):
-            rows = [
-                (row[0] + part.shift - moved, *row[1:])
-                for row in part.rows or ()
-                if low <= row[0] + part.shift <= high
-            ]
+            placed = ((s + part.shift, *values) for s, *values in part.rows or ())
+            rows = [(s - moved, *values) for s, *values in placed if low <= s <= high]
             if len(rows) >= 4:
                 cut: Any = {"rows": tuple(rows), "shift": 0.0, "mileage": None}
                 parts.append(part.model_copy(update=cut))
@@ -382,11 +365,15 @@ def _judged(
     rows = np.array([*shares.values()]).reshape(-1, len(cells))
     exceeded = np.any(rows > share, axis=0) | lifted
     unknown = ~lifted & (np.isnan(rows).any(axis=0) | (len(shares) < asked))
-    remarks = [*remarks, *_lifting(unloaded)]
+    lifting = (
+        f"{vehicle} lifts a wheel at {3.6 * speed:.0f} km/h, first at s = {min(s):.0f} m: Y/Q has "
+        "no value there, and its sections are flagged."
+        for (vehicle, speed), s in unloaded.items()
+    )
     sections, flagged = geometry.sections(exceeded, unknown, max(case.speed for case, *_ in runs))
     return TrackAssessment(
         outcome.folder, share, tuple(_strongest(places)), cells, shares, sections, flagged,
-        outcome.computed, tuple(remarks),
+        outcome.computed, (*remarks, *lifting),
     )  # fmt: skip
 
 
@@ -400,12 +387,11 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
         at = Situation(case.vehicle, service, "1", np.inf, wheelset, Q0, laws)
         return float(laws[name].at(at))
 
-    found = []
-    load = np.asarray(result["Q0"], dtype=float).mean(axis=1)
-    at = np.asarray(result["wheelset_distance"], dtype=float)
+    found: list[tuple[str, str, Floats, Floats, float]] = []
+    load, at = result["Q0"].mean(axis=1), result["wheelset_distance"]
     rate = len(at) / float(result["time"][-1] - result["time"][0])
     window = max(1, round(SLIDING / case.speed * rate))
-    Q, Y = (low_passed(np.asarray(result[name], float), rate, LOW_PASS) for name in "QY")
+    Q, Y = (low_passed(result[name], rate, LOW_PASS) for name in "QY")
     quotient = np.where(np.isnan(result["Y_over_Q"]), np.nan, outward_quotient(Y, Q))
 
     def mean(x: Floats) -> Floats:
@@ -425,11 +411,11 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
         found += [(n, place, at[:, w], x, limit(n, w, float(load[w]))) for n, place, x in values]
     placed = sensors(case.vehicle)
     for point, axis in product(POINTS, "yz"):
-        x = np.asarray(result.series("sensor_acceleration", sensor=point, axis=axis), float)
+        x = result.series("sensor_acceleration", sensor=point, axis=axis)
         x = passed(x, rate, RIDE_BAND)  # what is steady in curves has a limit of its own
         name, s = f"body_{axis}", result["distance"] + placed[point].along
         found.append((name, point, s, np.abs(x), limit(name)))
-    return [(n, p, np.asarray(s, float), np.asarray(v, float), m) for n, p, s, v, m in found]
+    return found
 
 
 def _peaks(s: Floats, part: Floats, share: float) -> list[int]:

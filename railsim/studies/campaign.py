@@ -325,10 +325,8 @@ def fitted_curves(
     for k, element in enumerate(plan):
         if isinstance(element, Circle):
             plan[k] = element.model_copy(update={"radius": factor * element.radius})
-    changed: dict[str, Any] = {
-        "plan": (*plan,),
-        "speed": track.speed and track.speed * at / as_drawn,
-    }
+    permitted = track.speed and track.speed * at / as_drawn
+    changed: dict[str, Any] = {"plan": (*plan,), "speed": permitted}
     wanted = speed.cant_deficiency * service.cant_deficiency
     cant = max(0.0, cant_deficiency(at, 1.0 / (factor * speed.radius), wanted))
     if cant < speed.cant - 1e-6:  # m

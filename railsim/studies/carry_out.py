@@ -57,15 +57,13 @@ Load = Callable[[Sequence[Point]], list[Case]]
 
 def carry_out_cases(cases: Sequence[Case], spec: StudySpec, folder: Path, **how: Any) -> Outcome:
     """Compute the missing runs of loaded cases, the longest first; `how`: fields of `Execution`."""
-    points = [
-        Point(c.name, RunSpec(c.vehicle.name, c.track.name, c.speed), c.labels, c.key)
-        for c in cases
-    ]
+    runs = [RunSpec(case.vehicle.name, case.track.name, case.speed) for case in cases]
+    points = [Point(c.name, run, c.labels, c.key) for c, run in zip(cases, runs, strict=True)]
     check_names(points)
-    by_name = {case.name: case for case in cases}
+    by_point = dict(zip(points, cases, strict=True))
 
     def load(wanted: Sequence[Point]) -> list[Case]:
-        return [by_name[point.name] for point in wanted]
+        return [by_point[point] for point in wanted]
 
     return carry_out(points, load, spec, folder, Execution(longest_first=True, **how))
 
@@ -248,12 +246,8 @@ class State:
             raise InputError(faults)
         found = {point for point, _ in self.found}
         self.cases = [case for point, case in self._waiting.items() if point not in found]
-        check_laws(
-            law
-            for case in self.cases
-            for definition in (case.vehicle, case.track, case.settings)
-            for law in (definition.laws or {}).items()
-        )
+        inputs = ((case.vehicle, case.track, case.settings) for case in self.cases)
+        check_laws(law for each in inputs for one in each for law in (one.laws or {}).items())
         if not (execution.resume or execution.trying):
             runs = {point.name: point.run for point in waiting}
             varied = {*spec.grid, *(key for table in spec.linked for key in table)}
@@ -329,11 +323,8 @@ class State:
             remarks.append(f"{words}: it is computed again; the old file is kept as {old.name}")
         gone = [case.name for case in self.cases if case.file_name not in self._files]
         lost = [name for name in gone if name in self._entries and self._entries[name].size]
-        for names, words in (
-            (self._changed, "of other inputs"),
-            (self._reduced, "without all quantities or digits"),
-            (lost, "no longer there"),
-        ):
+        endings = "of other inputs", "without all quantities or digits", "no longer there"
+        for names, words in zip((self._changed, self._reduced, lost), endings, strict=True):
             if names:
                 number = "1 result is" if len(names) == 1 else f"{len(names)} results are"
                 remarks.append(f"{number} {words} and computed again: {listed(names)}")

@@ -1,4 +1,4 @@
-"""A case: all inputs of one run, loaded and checked."""
+"""A case: all inputs of one run, loaded and checked; its run."""
 
 import hashlib
 import json
@@ -20,6 +20,10 @@ from railsim.files.overrides import split_overrides
 from railsim.files.sources import OVERRIDE
 from railsim.profiles import load_profile
 from railsim.profiles.used import profile_faults, profile_hashes
+from railsim.result import Hdf5Sink, MemorySink, Result
+from railsim.result.hdf5 import PLAIN, Storage
+from railsim.result.sinks import EVERYTHING
+from railsim.simulation import simulate
 from railsim.simulation.conditions import check_agreement, check_range, initial_speed
 from railsim.studies.spec import RunSpec
 from railsim.version import __version__
@@ -233,6 +237,38 @@ def load_case(run: RunSpec) -> Case:
     loader.check()
     assert case is not None  # without a fault
     return case
+
+
+def run_case(
+    case: Case,
+    path: str | Path | None,
+    *,
+    overwrite: bool,
+    progress: Callable[[float], None] | None,
+    resume: Result | None = None,
+    only: Collection[str] = EVERYTHING,
+    storage: Storage = PLAIN,
+) -> Result:
+    """Run a case to its file, which carries name and key of the case.
+
+    `path`: result file; None to keep the result in memory; `resume`: result whose final state is
+    the initial state of this run; the file then carries no key; `only`: names of the quantities in
+    a result in memory, with ``*`` for any characters; by default all; `storage`: of the file.
+    Raises InputError, ModelError: as `railsim.simulate`; the file cannot be written.
+    """
+    facts = {"run": case.name}
+    if resume is None:
+        facts["inputs_hash"] = case.key
+    else:
+        facts["continues"] = str(resume.attributes.get("run", "another run"))
+    with (
+        MemorySink(facts, only)
+        if path is None
+        else Hdf5Sink(path, overwrite=overwrite, attributes=facts, storage=storage)
+    ) as sink:
+        return simulate(
+            case.vehicle, case.track, **case.conditions, sink=sink, progress=progress, resume=resume
+        )
 
 
 def run_labels(run: RunSpec) -> dict[str, str | float]:

@@ -14,7 +14,6 @@ from railsim.arrays import Floats
 from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Constraint, Objective, Optimise, Value, Variable
 from railsim.errors import Fault, Faults, nearest
-from railsim.studies.outcome import Outcome
 from railsim.studies.plan import selects
 from railsim.studies.records import Record
 from railsim.studies.search import Values
@@ -47,6 +46,11 @@ class Design:
     def values(self) -> tuple[float, ...]:
         """Of objectives, then constraints."""
         return (*self.objectives, *self.constraints)
+
+    def record(self) -> dict[str, Any]:
+        """Return the design as plain data [SI]."""
+        names = ("number", "feasible", "variables", "objectives", "constraints")
+        return {name: getattr(self, name) for name in names}
 
     @property
     def remark(self) -> str:
@@ -83,10 +87,8 @@ class Evaluation:
         """Compute designs, and return the values of all designs requested so far."""
         known = {row: number for number, row in enumerate(self.rows)}
         for point in points:
-            row = tuple(
-                _written(variable, float(share))
-                for share, (_, variable) in zip(point, self.variables, strict=True)
-            )
+            shares = zip(point.tolist(), self.variables, strict=True)
+            row = tuple(_written(variable, share) for share, (_, variable) in shares)
             if row not in known:
                 known[row] = len(self.rows)
                 self.rows.append(row)
@@ -106,7 +108,8 @@ class Evaluation:
         outcome = run_study(spec, self.folder, replace(self._execution, progress=progress))
         self._execution = replace(self._execution, resume=True, overwrite=False)
         self.computed += outcome.computed
-        rows = _complete_rows(outcome)
+        complete = (record for record in outcome.records if record["status"] == "complete")
+        rows = [(record["labels"], summary_row(record)) for record in complete]
         _check_quantities(self.wanted, rows)
         for text in () if self.designs else _sign_remarks(self.wanted, rows):
             (self._execution.on_remark or _LOG.warning)(text)
@@ -219,20 +222,12 @@ def _scale(one: Constraint, excess: Sequence[float]) -> float:
     return max((abs(x) for x in excess if not math.isnan(x)), default=0.0) or 1.0
 
 
-def _complete_rows(outcome: Outcome) -> Rows:
-    return [
-        (record["labels"], summary_row(record))
-        for record in outcome.records
-        if record["status"] == "complete"
-    ]
-
-
 def _sign_remarks(wanted: Optimise, rows: Rows) -> Iterator[str]:
     """Yield what counts with its sign although its column is one of largest magnitudes.
 
     The sign is a direction, which turns with the curve: a large negative value is not a small one.
     """
-    for one in (*wanted.objectives, *wanted.constraints):
+    for one in wanted.values.values():
         both = isinstance(one, Constraint) and None not in (one.low, one.high)
         if both or one.magnitude or not _MAGNITUDE.fullmatch(one.quantity):
             continue
@@ -248,14 +243,11 @@ def _check_quantities(wanted: Optimise, rows: Rows) -> None:
     if not rows:
         return
     known = {name for _, cells in rows for name, v in cells.items() if isinstance(v, int | float)}
-    faults = Faults()
-    for table, ones in (("objectives", wanted.objectives), ("constraints", wanted.constraints)):
-        for number, one in enumerate(ones):
-            key = f"optimise.{table}.{number}"
-            if one.quantity not in known:
-                found = f"no run has '{one.quantity}'"
-                faults.append(Fault(INPUTS, f"{key}.quantity", found, nearest(one.quantity, known)))
-    faults.check()
+    Faults(
+        Fault(INPUTS, f"{key}.quantity", f"no run has '{one}'", nearest(one, known))
+        for key, one in ((key, value.quantity) for key, value in wanted.values.items())
+        if one not in known
+    ).check()
 
 
 def name_of(one: Value) -> str:
@@ -280,7 +272,7 @@ def values_by_name(
     over the runs, the smallest and the largest of them do.
     """
     found: dict[str, list[float]] = {}
-    for number, one in enumerate((*wanted.objectives, *wanted.constraints)):
+    for number, one in enumerate(wanted.values.values()):
         name, values = named(one), [design.values[number] for design in designs]
         if not np.array_equal(found.get(name, values), values, equal_nan=True):
             name = f"{name}, {of_the_runs(one)}"

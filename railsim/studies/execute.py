@@ -33,9 +33,8 @@ from railsim.result.sinks import EVERYTHING, matches
 from railsim.simulation import simulate
 from railsim.simulation.first_start import compile_time_loop, is_compiled
 from railsim.studies.analyses import analysed
-from railsim.studies.case import Case
+from railsim.studies.case import Case, run_case
 from railsim.studies.records import Record
-from railsim.studies.run import run_case
 from railsim.studies.summary import failed_record, finished_record, waiting_record
 
 GRACE = 3.0  # seconds that running jobs have to stop
@@ -84,7 +83,13 @@ def perform(job: Job, progress: Progress | None = None) -> Record:
     file = job.path if job.whole else None
     try:
         how: dict[str, Any] = {"progress": progress, "only": only, "storage": job.storage}
-        return _record(job, run_case(case, file, overwrite=True, **how))
+        result = run_case(case, file, overwrite=True, **how)
+        if job.picture is not None and len(result["time"]):
+            from railsim.plot.histories import histories
+            from railsim.plot.style import save
+
+            save(histories(result), job.picture, overwrite=True)
+        return {**finished_record(case, result, job.function), "file": _reduced(job, result)}
     except Stopped:
         raise
     except Exception as error:
@@ -105,16 +110,6 @@ def _analysed(job: Job) -> Record:
         facts = {"status": "complete", "cpu_time": cpu_time, "quantities": quantities}
         facts["remarks"] = said
     return waiting_record(job.case) | facts
-
-
-def _record(job: Job, result: Result) -> Record:
-    """Draw the result of a job, and return its record."""
-    if job.picture is not None and len(result["time"]):
-        from railsim.plot.histories import histories
-        from railsim.plot.style import save
-
-        save(histories(result), job.picture, overwrite=True)
-    return {**finished_record(job.case, result, job.function), "file": _reduced(job, result)}
 
 
 def _reduced(job: Job, result: Result) -> str:

@@ -106,10 +106,7 @@ def described_runs(file: str) -> Description:
     statuses = Counter(str(record["status"]) for record in found.records)
     ended = ", ".join(f"{number} {status}" for status, number in statuses.items())
     keys = dict.fromkeys(key for record in found.records for key in record["labels"])
-    rows = [
-        {"run": record["name"], **record["labels"], "status": record["status"]}
-        for record in found.records
-    ]
+    rows = [{"run": r["name"], **r["labels"], "status": r["status"]} for r in found.records]
     shown = ({key: short(value) for key, value in row.items()} for row in rows)
     table = Table(["run", *keys, "status"], shown)
     title = f"{folder_of(file)}: {len(rows)} run{'s' * (len(rows) != 1)}, {ended}"

@@ -13,9 +13,9 @@ Opening 100 000 runs reads the heads only; a record is read on access.
 import os
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import AbstractContextManager, ExitStack, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, Self, overload
+from typing import Any, BinaryIO, NamedTuple, overload
 
 from railsim.errors import argument_error, input_error
 from railsim.files.access import locked
@@ -55,7 +55,7 @@ def size_and_time(file: os.stat_result | None) -> tuple[int, int]:
     return (0, 0) if file is None else (file.st_size, file.st_mtime_ns)
 
 
-class Journal:
+class Journal(AbstractContextManager["Journal"]):
     """The journal of a folder, open for reading and appending; locked for other processes.
 
     `folder`: folder of the study; it must exist; `entries`: the last entry of every run, by its
@@ -154,9 +154,6 @@ class Journal:
             os.close(self._handle)
             self._handle = -1
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
@@ -185,10 +182,8 @@ class Records(Sequence[Record]):
 
     def where(self, chosen: Callable[[str], bool]) -> tuple[Record, ...]:
         """Return the records of runs of a chosen status."""
-        found = []
-        for entry in self._entries:
-            if chosen(entry.status if isinstance(entry, Entry) else entry["status"]):
-                found.append(entry)
+        each = ((e.status if isinstance(e, Entry) else e["status"], e) for e in self._entries)
+        found = [entry for status, entry in each if chosen(status)]
         return tuple(record for record, _ in self._read(found))
 
     def with_texts(self) -> Iterator[tuple[Record, bytes]]:

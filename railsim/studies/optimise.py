@@ -148,18 +148,12 @@ class Optimisation:
             "goals": [one.goal for one in definition.objectives],
             "constraints": [name_of(one) for one in definition.constraints],
             "designs": len(self.designs),
-            "front": [_design_record(design) for design in self.front],
-            "chosen": None if self.chosen is None else _design_record(self.chosen),
+            "front": [design.record() for design in self.front],
+            "chosen": self.chosen and self.chosen.record(),
             "active": list(self.active),
             "sensitivities": [one.record() for one in self.sensitivities],
             "vehicles": [path.name for path in self.vehicles],
         }
-
-
-def _design_record(design: Design) -> dict[str, Any]:
-    own = {"objectives": list(design.objectives), "constraints": list(design.constraints)}
-    known = {"number": design.number, "feasible": design.feasible}
-    return {**known, "variables": design.variables, **own}
 
 
 def optimise(
@@ -309,10 +303,8 @@ def _active(
     found = []
     for path, variable in wanted.variables.items():
         share = share_of(variable, chosen.variables[path])
-        for words, distance, bound in (
-            ("lower", share, variable.low),
-            ("upper", 1.0 - share, variable.high),
-        ):
+        ends = ("lower", share, variable.low), ("upper", 1.0 - share, variable.high)
+        for words, distance, bound in ends:
             if distance <= NEAR_BOUND:
                 found.append(f"{path} at its {words} bound, {bound:.12g} {units[path]}".rstrip())
     number = len(wanted.constraints)
@@ -358,12 +350,8 @@ def export_vehicles(evaluation: Evaluation, chosen: Design) -> list[Path]:
     for (path, variable), text in zip(evaluation.variables, row, strict=True):
         texts += [f"{key}={text}" for key in (path, *variable.also)]
     overrides = split_overrides(texts)["vehicle"]
-    wanted = evaluation.wanted
-    ones = (*wanted.objectives, *wanted.constraints)
-    values = [
-        f"# {name_of(one)}: {value:.6g} {unit_of(one.quantity)}".rstrip()
-        for one, value in zip(ones, chosen.values, strict=True)
-    ]
+    of_design = zip(evaluation.wanted.values.values(), chosen.values, strict=True)
+    values = [f"# {name_of(v)}: {x:.6g} {unit_of(v.quantity)}".rstrip() for v, x in of_design]
     found = []
     for vehicle in evaluation.definition.vehicles:
         file = evaluation.folder / f"{Path(vehicle).stem}_chosen.toml"

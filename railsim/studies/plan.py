@@ -81,7 +81,9 @@ class Plan:
         self._spec = spec
         varied = {*spec.grid, *(k for t in spec.linked for k in t)}
         self._loader = Loader(varied, spec.analyses, contacts=True)
-        self._fingerprints = Fingerprints()
+        # hashes of files; each is read once
+        self._fingerprint = cache(self._with_overrides)
+        self._base, self._content = cache(self._of_file), cache(_content_hash)
         # what the record of a run depends on besides the run
         self._further = [f"told {told}"] if (told := fingerprint(spec.quantities)) else []
         self._further += [f"analyses {spec.analyses}"] if spec.analyses else []
@@ -111,8 +113,8 @@ class Plan:
 
     def _point(self, run: RunSpec, row: Row) -> Point:
         overrides = self._loader.overrides(run.assignments)
-        of = self._fingerprints.of
-        parts = [of(kind, getattr(run, kind), some) for kind, some in overrides.items()]
+        each = ((kind, getattr(run, kind), some) for kind, some in overrides.items())
+        parts = [self._fingerprint(*one) for one in each]
         inputs = (*parts, run.speed, run.start, run.duration, run.until, *self._further)
         key = "" if "" in parts else _hashed([__version__, *map(repr, inputs)])
         labels = {**run_labels(run), **row.values}
@@ -133,7 +135,7 @@ class Plan:
         from railsim.assessment.assess import limits_of
 
         limits_of(analysis.standard, analysis.limits)
-        return self._fingerprints.of("limits", analysis.limits, ())
+        return self._fingerprint("limits", analysis.limits, ())
 
     def _permitted(self, run: RunSpec) -> float | None:
         """Return the lower of the admissible speed of a vehicle and the speed of a track [m/s]."""
@@ -161,15 +163,6 @@ class Plan:
         if not isinstance(first, float):  # that of the track, or linked
             return ROUGH_DURATION
         return max(0.0, length - spec.start) / max(first, 0.5)
-
-
-class Fingerprints:
-    """Hashes of files with assignments; each file is read once."""
-
-    def __init__(self) -> None:
-        self.of = cache(self._with_overrides)
-        self._base = cache(self._of_file)
-        self._content = cache(_content_hash)
 
     def _with_overrides(self, kind: str, path: str | Path | None, overrides: Overrides) -> str:
         """Return the hash of a file with assignments; empty if it cannot be read."""
@@ -242,17 +235,10 @@ def check_study(study: Study) -> None:
         spec = spec.changed(linked=[*spec.linked, designs])
     plan = Plan(spec)
     plan.cases()
-    if study.optimise is not None:
-        _check_labels(plan, study.optimise)
-
-
-def _check_labels(plan: Plan, wanted: Optimise) -> None:
-    """Refuse labels that no run of an optimisation has."""
     Faults(
-        Fault("study", f"optimise.{table}.{number}.where", "no run has these labels",
+        Fault("study", f"{key}.where", "no run has these labels",
               "values of a run, such as its track, its speed or a key of the grid", "--optimise")
-        for table, ones in (("objectives", wanted.objectives), ("constraints", wanted.constraints))
-        for number, one in enumerate(ones)
+        for key, one in (study.optimise.values if study.optimise else {}).items()
         if not any(selects(one, point.labels) for point in plan.points)
     ).check()  # fmt: skip
 
@@ -286,12 +272,10 @@ def _check_quantities(study: Study, wanted: Optimise) -> None:
             forms.append(rf"{own}\..*")
     some = re.compile("|".join([*map(re.escape, known), *forms]))
     Faults(
-        Fault("study", f"optimise.{table}.{number}.quantity", f"no run has '{one.quantity}'",
-              nearest(one.quantity, known), "--optimise")
-        for table, ones in (("objectives", wanted.objectives), ("constraints", wanted.constraints))
-        for number, one in enumerate(ones)
-        if not some.fullmatch(one.quantity)
-    ).check()  # fmt: skip
+        Fault("study", f"{key}.quantity", f"no run has '{one}'", nearest(one, known), "--optimise")
+        for key, one in ((key, value.quantity) for key, value in wanted.values.items())
+        if not some.fullmatch(one)
+    ).check()
 
 
 def faults_of_file(file: str, *, assignments: bool = True) -> AbstractContextManager[None]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,14 +17,6 @@ from railsim.result import Result
 from railsim.studies.wear_loop import Loop, Run, Wearing, WearStep, carry_out, row, since_new
 
 
-class Traffic(NamedTuple):
-    """A vehicle, its speed [m/s] and its share of the tonnage, in any unit."""
-
-    vehicle: Vehicle
-    speed: float
-    share: float
-
-
 def rail_wear(
     track: Track, traffic: Sequence[tuple[Vehicle, float, float]], **how: Any
 ) -> list[WearStep]:
@@ -32,13 +24,13 @@ def rail_wear(
 
     The mean over the track is worn off: let it be of one curvature.  The wheels remain as they are.
 
-    `traffic`: vehicles with their speeds [m/s] and shares of the tonnage; `how`: `Loop`: ``step``
-    [kg] and ``steps`` are required. Raises InputError, ModelError: as of `wear_loop`.
+    `traffic`: vehicles with their speeds [m/s] and shares of the tonnage, in any unit; `how`:
+    `Loop`: ``step`` [kg] and ``steps`` are required. Raises InputError, ModelError: as of
+    `wear_loop`.
     """
-    sides = {side: f"{rail}, {side}" for side, rail in zip(SIDES, track.rail, strict=True)}
-    new = {
-        s: replace(load_profile(r), name=sides[s]) for s, r in zip(SIDES, track.rail, strict=True)
-    }
+    rails = dict(zip(SIDES, track.rail, strict=True))
+    sides = {side: f"{rail}, {side}" for side, rail in rails.items()}
+    new = {side: replace(load_profile(rails[side]), name=name) for side, name in sides.items()}
     # the two rails wear apart, so they have names of their own
     apart = track.replace(rail=list(sides.values()))
     runs = [Run(vehicle, apart, speed, share) for vehicle, speed, share in traffic]
@@ -46,10 +38,8 @@ def rail_wear(
     def depths(result: Result, law: WearLaw) -> dict[str, Floats]:
         load = float(np.sum(result["Q0"])) / GRAVITY
         passes = range(len(result.wheelsets))
-        return {
-            side: np.asarray(sum(rail_depth(result, w, k, law) for w in passes) / load)
-            for k, side in enumerate(SIDES)
-        }
+        own = (sum(rail_depth(result, w, side, law) for w in passes) for side in (0, 1))
+        return {side: np.asarray(depth / load) for side, depth in zip(SIDES, own, strict=True)}
 
     needed: dict[str, Any] = {"outputs": ("contact_patches", "track"), "unit": "Mt", "scale": 1e-9}
     return carry_out(Wearing(runs, new, sides, depths, given="traffic", **needed), Loop(**how))

@@ -8,7 +8,7 @@ from typing import Any
 
 import orjson
 
-from railsim.errors import InputError, input_error
+from railsim.errors import InputError
 from railsim.files.access import TABLE_BYTES, make_folder, read_text, write_text
 from railsim.text import plain
 
@@ -21,30 +21,22 @@ def write_record(path: Path, record: Record) -> None:
     write_text(path, json.dumps({"crc32": _crc(record), "record": record}))
 
 
-def read_record(path: Path) -> Record:
-    """Return a stored record; raises InputError: it cannot be read, or is damaged."""
-    text = read_text(path, TABLE_BYTES)
-    try:
-        stored = json.loads(text)
-        whole = stored["crc32"] == _crc(stored["record"])
-    except (ValueError, TypeError, KeyError, RecursionError):
-        whole = False
-    if not whole:
-        raise input_error(path, "the record is damaged")
-    record: Record = stored["record"]
-    return record
-
-
 def kept_record(path: Path | None, remark: Callable[[str], None]) -> Record | None:
     """Return a record stored before, if any; one that is damaged is removed, with a remark."""
     if path is None or not path.exists():
         return None
+    words = f"{path}: the record is damaged"
     try:
-        return read_record(path)
+        stored: dict[str, Record] = json.loads(read_text(path, TABLE_BYTES))
+        if stored["crc32"] == _crc(stored["record"]):
+            return stored["record"]
     except InputError as error:
-        remark(f"{error.faults[0]}: it is computed again")
-        path.unlink()
-        return None
+        words = str(error)
+    except (ValueError, TypeError, KeyError, RecursionError):
+        pass
+    remark(f"{words}: it is computed again")
+    path.unlink()
+    return None
 
 
 def _crc(record: Any) -> str:

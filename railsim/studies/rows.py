@@ -69,13 +69,10 @@ def sampled(sample: Sample) -> list[dict[str, str]]:
 
     count = len(sample.parameters)
     engine = qmc.Sobol if sample.method == "sobol" else qmc.LatinHypercube
-    return [
-        {
-            name: f"{quantile(spread, float(share)):.10g}"
-            for (name, spread), share in zip(sample.parameters.items(), row, strict=True)
-        }
-        for row in engine(d=count, seed=sample.seed).random(sample.number)
-    ]
+    spreads = sample.parameters.values()
+    rows = engine(d=count, seed=sample.seed).random(sample.number).tolist()
+    values = ([f"{one:.10g}" for one in map(quantile, spreads, row)] for row in rows)
+    return [dict(zip(sample.parameters, row, strict=True)) for row in values]
 
 
 def quantile(spread: Spread, share: float) -> float:

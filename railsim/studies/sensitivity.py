@@ -76,13 +76,8 @@ def sensitivities(
     if count == 1:
         first[explained] = total[explained] = 1.0
     elif len(explained):
-        distributions: list[Any] = [uniform()] * count
-        indices = sobol_indices(
-            func=lambda x: model(x.T)[:, explained].T,
-            n=SAMPLES,
-            dists=distributions,
-            random_state=np.random.default_rng(0),
-        )
+        how: Any = {"dists": [uniform()] * count, "random_state": np.random.default_rng(0)}
+        indices = sobol_indices(func=lambda x: model(x.T)[:, explained].T, n=SAMPLES, **how)
         first[explained] = np.reshape(indices.first_order, (len(explained), count))
         total[explained] = np.reshape(indices.total_order, (len(explained), count))
     errors = model.errors()

@@ -117,11 +117,8 @@ def map_speeds(records: Sequence[Record]) -> dict[str, np.ndarray]:
     # of those that failed too, which say only where they are
     own = [record.get("conicity") or record.get("at", {}).get("conicity") for record in records]
     cones = {conicity for conicity in own if conicity}
-    contact = Contact(
-        first.get("linearisation", "tangent"),
-        first.get("amplitude") or AMPLITUDE,
-        cones.pop() if len(cones) == 1 else None,
-    )
+    kind, amplitude = first.get("linearisation", "tangent"), first.get("amplitude") or AMPLITUDE
+    contact = Contact(kind, amplitude, cones.pop() if len(cones) == 1 else None)
     kinds = {"linear": f"linear, {contact.words()}"}
     methods = dict.fromkeys(m for one in records for m in one.get("nonlinear_by_method") or ())
     if methods:
@@ -141,10 +138,8 @@ def map_table(records: Sequence[Record], parameters: Mapping[str, str]) -> Table
     speeds = map_speeds(records)
     columns = [Column(name, unit=unit, format="g") for name, unit in parameters.items()]
     columns += [Column(words, unit="m/s", format=".2f") for words in speeds]
-    rows = [
-        [*(record["at"][name] for name in parameters), *(column[k] for column in speeds.values())]
-        for k, record in enumerate(records)
-    ]
+    of_point = zip(records, *speeds.values(), strict=True)
+    rows = [[*(record["at"][name] for name in parameters), *own] for record, *own in of_point]
     missing = [_without_linear(record) for record in records]
     if any(missing):
         columns.append(Column("linear", " "))

@@ -138,10 +138,8 @@ class Stationary:
     def record(self) -> dict[str, object]:
         """Return the tests as plain numbers and strings, SI."""
         values = [{**v.__dict__, "exceeded": v.exceeded} for v in self.values]
-        loops = {
-            name: {"share": loop.share.tolist(), "Q": loop.Q.tolist(), "Q0": loop.Q0.tolist()}
-            for name, loop in self.loops.items()
-        }
+        keys = ("share", "Q", "Q0")
+        loops = {n: {k: getattr(one, k).tolist() for k in keys} for n, one in self.loops.items()}
         return {
             "vehicle": self.vehicle, "edition": self.edition, "verdict": self.verdict,
             "reasons": list(self.reasons), "remarks": list(self.remarks), "held": self.held,
@@ -257,11 +255,8 @@ def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floa
     base = float(np.ptp(within))
     over_bogie = limits.bogie_twist.over(base)
     bogie = over_bogie * within
-    return {
-        f"twist {1e3 * over_bogie:.2f} permille over {base:g} m": bogie,
-        name: body,
-        "both twists": bogie + body,
-    }
+    of_bogie = f"twist {1e3 * over_bogie:.2f} permille over {base:g} m"
+    return {of_bogie: bogie, name: body, "both twists": bogie + body}
 
 
 def _unloading(

@@ -46,16 +46,8 @@ WHEEL = "wheel"
 _LOG = logging.getLogger(__name__)
 
 
-class Route(NamedTuple):
-    """A track, the speed on it [m/s] and its share of the distance, in any unit."""
-
-    track: Track
-    speed: float
-    share: float
-
-
 class Run(NamedTuple):
-    """One of the runs that are averaged, with its share."""
+    """One of the runs that are averaged, with its share, in any unit."""
 
     vehicle: Vehicle
     track: Track

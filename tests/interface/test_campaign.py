@@ -13,7 +13,7 @@ from made_record import made
 from selection import points
 
 import railsim
-import railsim.studies.run
+import railsim.studies.case
 from railsim.assessment import assess
 from railsim.assessment.sections import track_sections
 from railsim.assessment.track_quality import TrackQuality
@@ -405,7 +405,7 @@ def simulated(monkeypatch):
         left[0] -= 1
         return feed(sink, duration=1.0, rate=10.0)
 
-    monkeypatch.setattr(railsim.studies.run, "simulate", simulate)
+    monkeypatch.setattr(railsim.studies.case, "simulate", simulate)
     monkeypatch.setattr(railsim.studies.campaign, "assess", lambda *_, **how: [])
     return left
 
@@ -455,7 +455,7 @@ def test_exit_status_tells_of_runs_that_ended_early(tmp_path, simulated, monkeyp
     def simulate(*_, sink, **how):
         return feed(sink, duration=1.0, rate=10.0, status=status)
 
-    monkeypatch.setattr(railsim.studies.run, "simulate", simulate)
+    monkeypatch.setattr(railsim.studies.case, "simulate", simulate)
     (tmp_path / "two.toml").write_text(TWO)
     given = ["study", "--scenario", str(tmp_path / "two.toml"), "--vehicles", "coach_manchester"]
     given += ["--out", str(tmp_path / "out"), "--workers", "1", "--quiet"]
@@ -467,7 +467,7 @@ def test_failed_run_of_a_campaign_is_a_line(tmp_path, monkeypatch, capsys):
     def simulate(*_, **how):
         raise railsim.errors.ModelError("no equilibrium")
 
-    monkeypatch.setattr(railsim.studies.run, "simulate", simulate)
+    monkeypatch.setattr(railsim.studies.case, "simulate", simulate)
     scenario = tmp_path / "two.toml"
     scenario.write_text(TWO)
     given = ["study", "--scenario", str(scenario), "--vehicles", "coach_manchester", "--quiet"]

@@ -71,7 +71,7 @@ def test_chosen_quantities_compressed_and_single_are_kept_and_the_summary_is_who
 def test_compressed_results_stream_to_their_files(tmp_path, simulated, monkeypatch):
     """A long run is not held in memory until it is compressed."""
     assert main(arguments(tmp_path / "all", 10)) == 0
-    monkeypatch.setattr("railsim.studies.run.MemorySink", lambda *_: None)
+    monkeypatch.setattr("railsim.studies.case.MemorySink", lambda *_: None)
     assert main(arguments(tmp_path / "kept", 10, more=["--compress"])) == 0
     whole, kept = (open_run(tmp_path / name / f"{RUN}.h5") for name in ("all", "kept"))
     assert set(kept) == set(whole)

@@ -26,7 +26,7 @@ from selection import points
 from started import started
 
 import railsim
-import railsim.studies.run
+import railsim.studies.case
 from railsim.cli import main
 from railsim.errors import InputError, ModelError
 from railsim.kernels import FASTMATH
@@ -60,7 +60,7 @@ def simulated(monkeypatch):
         status = "derailed" if speed == 99.0 else "complete"
         return feed(sink, speed=speed, duration=20.0, status=status)
 
-    monkeypatch.setattr(railsim.studies.run, "simulate", simulate)
+    monkeypatch.setattr(railsim.studies.case, "simulate", simulate)
     return speeds
 
 
@@ -173,7 +173,7 @@ def test_interrupted_study_goes_on_from_what_it_has(tmp_path, simulated, monkeyp
     assert [row["status"] for row in rows(tmp_path)] == ["complete", "waiting", "waiting"]
     assert set(os.listdir(tmp_path)) == {f"{COACH}_{CURVE}_10.h5", *LEFT}
     whole = lambda *a, sink, speed, **how: simulated.append(speed) or feed(sink)  # noqa: E731
-    monkeypatch.setattr(railsim.studies.run, "simulate", whole)
+    monkeypatch.setattr(railsim.studies.case, "simulate", whole)
     assert main(["study", "--resume", "--out", str(tmp_path), "--workers", "1"]) == 0
     assert simulated == [10.0, 15.0, 15.0, 20.0]
     assert index(tmp_path)["status"] == "complete"
@@ -397,7 +397,7 @@ def test_resume_goes_on_from_any_folder(tmp_path, simulated, monkeypatch):
     monkeypatch.chdir(tmp_path / "begun")
     given = ["--vehicles", "coach.toml", "--tracks", CURVE, "--speeds", "10", "15", "20"]
     assert main(["study", *given, "--out", "out", "--workers", "1"]) == 130
-    monkeypatch.setattr(railsim.studies.run, "simulate", lambda *a, sink, **how: feed(sink))
+    monkeypatch.setattr(railsim.studies.case, "simulate", lambda *a, sink, **how: feed(sink))
     monkeypatch.chdir(tmp_path / "elsewhere")
     out = tmp_path / "begun" / "out"
     assert main(["study", "--resume", "--out", "../begun/out", "--workers", "1"]) == 0
@@ -436,14 +436,14 @@ def test_a_million_runs_are_told_at_once(tmp_path, simulated, capsys):
 def test_full_disk_ends_a_study_in_a_line_and_keeps_what_is_done(
     tmp_path, simulated, monkeypatch, capsys
 ):
-    simulate = railsim.studies.run.simulate
+    simulate = railsim.studies.case.simulate
 
     def full(*inputs, speed, **how):
         if speed == 20.0:
             raise OSError(errno.ENOSPC, "no space left", "run.h5")
         return simulate(*inputs, speed=speed, **how)
 
-    monkeypatch.setattr(railsim.studies.run, "simulate", full)
+    monkeypatch.setattr(railsim.studies.case, "simulate", full)
     assert main(arguments(tmp_path, 10, 20, 30)) == 1
     assert capsys.readouterr().err.startswith("railsim: No space left on device: ")
     assert simulated == [10.0]

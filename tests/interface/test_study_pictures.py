@@ -13,7 +13,7 @@ from test_study import COACH, CURVE
 from test_study import simulated as simulated
 
 import railsim
-import railsim.studies.run
+import railsim.studies.case
 from railsim.cli import main
 from railsim.cli.plot import _joined, _study_figure
 from railsim.compare import differences
@@ -27,7 +27,7 @@ def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("made") / "s"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            railsim.studies.run, "simulate", lambda *_, speed, sink, **how: feed(sink, speed=speed)
+            railsim.studies.case, "simulate", lambda *_, speed, sink, **how: feed(sink, speed=speed)
         )
         railsim.study([COACH, "coach_flexicoil"], CURVE, SPEEDS, out=out, workers=1,
                       grid={"track.friction": [0.3, 0.4]})  # fmt: skip
@@ -64,7 +64,7 @@ def test_medians_mix_no_vehicles_and_say_what_else(folder):
 def test_seeds_are_no_axis(speeds, tmp_path, monkeypatch):
     """They have no order: runs over a seed alone are ranked, others are over what else varies."""
     monkeypatch.setattr(
-        railsim.studies.run, "simulate", lambda *_, speed, sink, **how: feed(sink, speed=speed)
+        railsim.studies.case, "simulate", lambda *_, speed, sink, **how: feed(sink, speed=speed)
     )
     rails = 'track.irregularities=[{type="random", spectrum="erri_b176_low"}]'
     railsim.study(COACH, CURVE, speeds, out=tmp_path / "s", workers=1, assignments=[rails],
@@ -81,7 +81,7 @@ def test_seeds_are_no_axis(speeds, tmp_path, monkeypatch):
 def test_words_and_seeds_are_axes_if_asked_for(chosen, across, tmp_path, monkeypatch):
     """Though they have no order: no ranking of the runs takes the place of what was asked for."""
     monkeypatch.setattr(
-        railsim.studies.run, "simulate", lambda *_, speed, sink, **how: feed(sink, speed=speed)
+        railsim.studies.case, "simulate", lambda *_, speed, sink, **how: feed(sink, speed=speed)
     )
     rails = 'track.irregularities=[{type="random", spectrum="erri_b176_low"}]'
     railsim.study([COACH, "coach_flexicoil"], CURVE, 10.0, out=tmp_path, workers=1,

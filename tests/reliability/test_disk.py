@@ -131,7 +131,7 @@ def test_full_disk_keeps_the_journal_whole(small_disk):
 
 
 def test_folder_that_goes_away_is_one_line(tmp_path, monkeypatch, capsys):
-    import railsim.studies.run
+    import railsim.studies.case
 
     def simulate(*_, sink, **how):
         (tmp_path / "out").rename(tmp_path / "moved")
@@ -139,7 +139,7 @@ def test_folder_that_goes_away_is_one_line(tmp_path, monkeypatch, capsys):
 
         return feed(sink, duration=1.0)
 
-    monkeypatch.setattr(railsim.studies.run, "simulate", simulate)
+    monkeypatch.setattr(railsim.studies.case, "simulate", simulate)
     (tmp_path / "out").mkdir()
     given = ["run", "coach_manchester", "straight", "--speed", "20", "--quiet"]
     assert main([*given, "--out", str(tmp_path / "out" / "run.h5")]) == 1

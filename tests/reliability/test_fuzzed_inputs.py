@@ -14,7 +14,7 @@ import pytest
 from cases import bounded, outcome, tried
 from mutations import HOSTILE, bytes_damaged, text_damaged
 
-import railsim.studies.run
+import railsim.studies.case
 from railsim.cli import main
 from railsim.errors import InputError
 from railsim.result import check_result
@@ -228,7 +228,7 @@ def test_damaged_files_of_studies(tmp_path, capsys, monkeypatch):
     def simulate(*_, sink, progress, **how):
         return feed(sink, duration=1.0, rate=10.0)
 
-    monkeypatch.setattr(railsim.studies.run, "simulate", simulate)
+    monkeypatch.setattr(railsim.studies.case, "simulate", simulate)
     folder = tmp_path / "study"
     given = ["study", "--vehicles", "coach_manchester", "--tracks", "straight", "--quiet"]
     given += ["--speeds", "20", "21", "--out", str(folder), "--workers", "1"]
@@ -290,7 +290,7 @@ def test_arguments(tmp_path, capsys, monkeypatch):
     def refuse(*_, **how):
         raise InputError([])
 
-    for module in ("railsim.studies.run.simulate", "railsim.contact.contact_geometry"):
+    for module in ("railsim.studies.case.simulate", "railsim.contact.contact_geometry"):
         monkeypatch.setattr(module, refuse, raising=False)
 
     def case(seed):

@@ -17,7 +17,7 @@ from railsim.constants import GRAVITY
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 from railsim.profiles import load_profile
-from railsim.studies.rail_wear import Traffic, rail_rows, rail_wear
+from railsim.studies.rail_wear import rail_rows, rail_wear
 
 SETTINGS = Settings(start_state="steady")
 pytestmark = pytest.mark.usefixtures("small_contact_tables")
@@ -82,14 +82,14 @@ def test_worn_rail_loses_the_area_and_nothing_below_its_head(place):
 
 
 def test_a_wrong_step_is_named_as_tonnage():
-    mix = [Traffic(railsim.load_vehicle("coach_manchester"), 20.0, 1.0)]
+    mix = [(railsim.load_vehicle("coach_manchester"), 20.0, 1.0)]
     with pytest.raises(railsim.InputError, match="step: found -1 Mt; above 0"):
         rail_wear(curve(), mix, step=-1e9, steps=1)
 
 
 def test_rails_wear_over_the_tonnage_of_a_mix():
     coach, told = railsim.load_vehicle("coach_manchester"), []
-    mix = [Traffic(coach, 20.0, 3.0), Traffic(coach, 18.0, 1.0)]
+    mix = [(coach, 20.0, 3.0), (coach, 18.0, 1.0)]
     (step,) = rail_wear(curve(), mix, step=5e6, steps=1, settings=SETTINGS, on_step=told.append)
     assert told == [step]
     rows = rail_rows([step])
@@ -116,7 +116,7 @@ def test_every_vehicle_of_a_mix_that_hunts_is_named():
     straight = railsim.load_track("straight").replace(plan=[{"type": "STR", "length": 60.0}])
     coach, told = railsim.load_vehicle("coach_manchester"), []
     names = ["coach A", "coach B"]
-    mix = [Traffic(coach.model_copy(update={"name": name}), 60.0, 1.0) for name in names]
+    mix = [(coach.model_copy(update={"name": name}), 60.0, 1.0) for name in names]
     rail_wear(straight, mix, step=1e3, steps=1, on_remark=told.append)
     began = [words.split(": The vehicle hunts at")[0] for words in told]
     assert began == [f"after 0 Mt on {straight.name} at 60 m/s, {name}" for name in names]

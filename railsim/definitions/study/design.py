@@ -88,6 +88,14 @@ class Optimise(base.Definition):
         """Paths of all keys that are varied."""
         return [*self.variables, *(key for v in self.variables.values() for key in v.also)]
 
+    @property
+    def values(self) -> dict[str, Value]:
+        """Objectives, then constraints, by their keys in the file."""
+        tables = {"objectives": self.objectives, "constraints": self.constraints}
+        return {
+            f"optimise.{t}.{k}": one for t, ones in tables.items() for k, one in enumerate(ones)
+        }
+
     @base.check
     def _consistent(self) -> None:
         names = self.keys
