@@ -89,5 +89,4 @@ def _read(file: Path) -> dict[str, Any]:
     if not modes or not complete:
         allowed = "the JSON of railsim modes"
         raise input_error(file, "missing or incomplete", allowed, key="modes")
-    checked: dict[str, Any] = data
-    return checked
+    return dict(data)

@@ -378,13 +378,9 @@ class Output:
         `name`: its name; `content`: bytes, a text, a `Table` (as CSV), a figure, or plain data (as
         JSON); a function that returns one of them is called only where something is written.
         """
-        if self.folder is None:
-            return
-        access.make_folder(self.folder)
-        path = self.folder / name
-        with access.whole_file(path) as partial:
-            partial.write_bytes(_bytes(content))
-        self.written.append(path)
+        if self.folder is not None:
+            data = {name: _bytes(content)}
+            self.written += access.write_folder(self.folder, data, overwrite=True)
 
     def write_all(self, content: Mapping[str, Any]) -> None:
         """Write files into the folder, all of them or none; contents as of `write`.

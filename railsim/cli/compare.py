@@ -102,7 +102,6 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
 
 
 def _named(name: str, title: str) -> str:
-    """Return the name of a file of a group."""
     from railsim.studies.rows import in_a_name
 
     stem, _, ending = name.partition(".")

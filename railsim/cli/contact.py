@@ -152,7 +152,6 @@ def _check(
 
 
 def _profiles(names: Sequence[str], kind: Any) -> tuple[Any, Any]:
-    """Left and right profile."""
     from railsim.profiles import load_profile
 
     loaded = {name: load_profile(name, kind) for name in dict.fromkeys(names)}
@@ -219,7 +218,6 @@ def _write(
 
 
 def _write_creep(output: cli.Output, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:
-    """Write pictures and table."""
     from railsim.contact.creep import LAWS
     from railsim.contact.creep_curves import CASES, exact_force
     from railsim.plot.creep import creep_curves_figure, traction_figure

@@ -108,7 +108,6 @@ def _animated(vehicle: "Vehicle", found: "Modes", name: str | None, page: Path) 
 
 
 def _over(given: cli.Given, over: str, speed: float, how: dict[str, Any]) -> "RootLocus":
-    """Root locus over one key of the inputs."""
     from railsim.definitions.units_of_keys import unit_of_input
     from railsim.linear.modes import parameter_locus
     from railsim.linear.vehicle import Contact, LinearVehicle, smooth_law

@@ -170,7 +170,6 @@ def command(
 
 
 def _grid(texts: Sequence[str]) -> dict[str, list[str]]:
-    """Values by the keys of ``--grid``."""
     from railsim.studies.plan import parse_grid
 
     faults, grid = Faults(), dict[str, list[str]]()

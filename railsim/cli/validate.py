@@ -3,7 +3,7 @@
 import os
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,6 +11,9 @@ from railsim.cli import common as cli
 from railsim.cli.terminal import echo, print_json
 from railsim.errors import Faults, fault_lines
 from railsim.files.access import RESULTS, is_file
+
+if TYPE_CHECKING:
+    from railsim.definitions.base import Remark
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
 
@@ -30,11 +33,12 @@ def command(files: tuple[str, ...], output: cli.Output) -> int:
     """
     reports: list[dict[str, Any]] = []
     for file in files:
-        faults, kind, remarks = Faults(), "", list[dict[str, str]]()
+        faults, kind, remarks = Faults(), "", list[Any]()
         with faults.caught():
             kind, remarks = checked(file)
         told = [asdict(fault) | {"text": str(fault)} for fault in faults]
-        reports.append({"file": file, "kind": kind or None, "faults": told, "remarks": remarks})
+        said = [dict(vars(remark)) for remark in remarks]
+        reports.append({"file": file, "kind": kind or None, "faults": told, "remarks": said})
         if output.as_json:
             continue
         for line in fault_lines(faults):
@@ -42,31 +46,30 @@ def command(files: tuple[str, ...], output: cli.Output) -> int:
         if not (output.quiet or faults):
             echo(f"{file}: {kind}, no faults")
             for remark in remarks:
-                echo(f"{file}: {remark['key']}: remark: {remark['text']}")
+                echo(f"{file}: {remark.key}: remark: {remark.text}")
     if output.as_json:
         print_json(reports)
     return cli.WRONG_INPUT if any(report["faults"] for report in reports) else cli.DONE
 
 
-def checked(file: str) -> tuple[str, list[dict[str, str]]]:
+def checked(file: str) -> "tuple[str, list[Remark]]":
     """Check one file and return its kind and the remarks on it.
 
     Raises InputError: all its faults.
     """
+    from railsim.definitions.base import Remark
+
     suffix = Path(file).suffix.lower()
     if suffix in PROFILE_SUFFIXES or _is_profile(file):
         from railsim.profiles import load_profile
 
         profile = load_profile(file)
-        return f"{profile.kind} profile", [
-            {"key": "points", "text": note} for note in profile.notes
-        ]
+        return f"{profile.kind} profile", [Remark("points", note) for note in profile.notes]
     if suffix in RESULTS:
         from railsim.result import check_result
 
         result = check_result(file)
-        remarks = [{"key": "remarks", "text": remark} for remark in result.remarks]
-        return f"result, {result.status}", remarks
+        return f"result, {result.status}", [Remark("remarks", text) for text in result.remarks]
     if suffix == ".json":
         from railsim.studies.summary import check_index
 
@@ -81,7 +84,7 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
         from railsim.measurement import load_measurement
 
         run = load_measurement(file)
-        return definition.KIND, [{"key": "channels", "text": remark} for remark in run.remarks]
+        return definition.KIND, [Remark("channels", text) for text in run.remarks]
     if definition.KIND in ("study", "scenario"):
         from railsim.studies.plan import check_study, faults_of_file
 
@@ -93,7 +96,7 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
 
                 check_parts(load_scenario(file), file)
     Faults(profile_faults(definition, file)).check()
-    return definition.KIND, [dict(vars(remark)) for remark in cli.remarks_on(definition)]
+    return definition.KIND, cli.remarks_on(definition)
 
 
 def _is_profile(name: str) -> bool:

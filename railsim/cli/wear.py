@@ -148,7 +148,9 @@ def _carry_out(
     record; `rows_of`: makes rows of each profile from the steps.
     """
     from railsim.assessment.wear import wear_law
+    from railsim.plot.study import rail_wear_figure, wear_figure
     from railsim.profiles import profile_text
+    from railsim.studies.wear_loop import since_new
 
     steps = _number_of_steps(of, distance, step)
     amounts = [of.scale * step * (number + 1) for number in range(steps)]
@@ -175,23 +177,16 @@ def _carry_out(
     record: dict[str, Any] = {**given, "step": of.scale * step, "law": law, **rows}
     record |= {"remarks": remarks, "ended": None if ended is None else str(ended)}
     files: dict[str, Any] = {RECORD: record} | {
-        _file_name(of, done.distance + done.length, side): profile_text(worn)
+        _file_name(of, done.distance + done.length, side): profile_text(one)
         for done in found
-        for side, worn in done.worn_profiles.items()
+        for side, one in done.worn_profiles.items()
     }
+    worn = {side: [(at, one) for at, one, _ in since_new(found, side)] for side in of.sides}
     if "rows" in rows:
-        from railsim.plot.study import wear_figure
-
-        wheels = [(0.0, found[0].profile), *((w.distance + w.length, w.worn) for w in found)]
         title = f"{given['vehicle']}: wear of the wheels"
-        files[PICTURE] = partial(wear_figure, wheels, rows["rows"], title)
+        files[PICTURE] = partial(wear_figure, worn[of.sides[0]], rows["rows"], title)
     else:
-        from railsim.plot.study import rail_wear_figure
-        from railsim.studies.wear_loop import since_new
-
-        rails = {side: [(at, worn) for at, worn, _ in since_new(found, side)] for side in rows}
-        title = f"{given['track']}: wear of the rails"
-        files[PICTURE] = partial(rail_wear_figure, rails, title)
+        files[PICTURE] = partial(rail_wear_figure, worn, f"{given['track']}: wear of the rails")
     output.write_all(files)
     if ended is None or not output.as_json:
         output.answer(record, _parts(of, given, wear_law(law).source, rows))

@@ -18,12 +18,9 @@ def describe_vehicle(vehicle: Vehicle) -> Description:
     """Return bodies as placed and mirrored, and elements: in the data likewise, else as written."""
     flat = flatten(vehicle)
     bodies = [
-        {
-            **{name: getattr(body, name) for name in _BODY},
-            "profile": body.wheelset.profile if body.wheelset else None,
-            "radius": body.wheelset.radius if body.wheelset else None,
-            "wheelset": body.parent,
-        }
+        {name: getattr(body, name) for name in _BODY}
+        | {name: getattr(body.wheelset, name, None) for name in ("profile", "radius")}
+        | {"wheelset": body.parent}
         for body in flat.bodies
     ]
     elements = [
@@ -35,19 +32,11 @@ def describe_vehicle(vehicle: Vehicle) -> Description:
         }
         for element in flat.elements
     ]
-    data = {
-        "kind": "vehicle",
-        "name": vehicle.name,
-        "source": vehicle.source,
-        "reference": flat.reference,
-        "mass": flat.mass,
-        "mean_wheel_load": flat.mean_wheel_load,
-        "service": vehicle.service and vehicle.service.model_dump(),
-        "load": vehicle.load,
-        "loads": list(vehicle.loads),
-        "bodies": bodies,
-        "elements": elements,
-    }
+    service, loads = vehicle.service, list(vehicle.loads)
+    data: dict[str, Any] = {"kind": "vehicle", "name": vehicle.name, "source": vehicle.source}
+    data |= {name: getattr(flat, name) for name in ("reference", "mass", "mean_wheel_load")}
+    data |= {"service": service and service.model_dump(), "load": vehicle.load, "loads": loads}
+    data |= {"bodies": bodies, "elements": elements}
     kinds = Counter(body.kind for body in flat.bodies)
     counted = ", ".join(f"{n} {_counted_kind(kind, n)}" for kind, n in kinds.items())
     parts: Parts = [
@@ -56,13 +45,12 @@ def describe_vehicle(vehicle: Vehicle) -> Description:
         f"{flat.mean_wheel_load / 1e3:.2f} kN; distance is that of '{flat.reference}'",
     ]
     parts += [f"  source: {vehicle.source}"] if vehicle.source else []
-    if (service := vehicle.service) is not None:
+    if service is not None:
         speed, height = 3.6 * service.admissible_speed, 1e3 * service.cant_deficiency
         limits = f"up to {speed:.4g} km/h and {height:g} mm of cant deficiency"
         parts.append(f"  service: {service.category.replace('_', ' ')}, {limits}")
-    if vehicle.loads:
-        cases = ", ".join(vehicle.loads)
-        parts.append(f"  load case: {vehicle.load or 'design'}; also defined: {cases}")
+    if loads:
+        parts.append(f"  load case: {vehicle.load or 'design'}; also defined: {', '.join(loads)}")
     lines = _element_rows(vehicle)
     number = Column("number", format="<d")
     columns: list[Column | str] = ["element", "kind", number, "between", "values"]

@@ -135,7 +135,6 @@ def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]
 
 
 def _paths(node: Any, before: tuple[str, ...] = ()) -> Iterator[list[str]]:
-    """Yield the paths of all tables, lists and values."""
     if isinstance(node, dict):
         members = [(str(key), value) for key, value in node.items()]
     elif isinstance(node, list):

@@ -75,7 +75,6 @@ def _changed(
     defaults: dict[str, Any],
     origin: str,
 ) -> Source:
-    """Return the source with keys set to what is made of their present values."""
     data = deepcopy(source.data)
     changed = replace(source, data=data, origin=dict(source.origin))
     faults = Faults()

@@ -123,7 +123,6 @@ class Measurement:
         return replace(self, remarks=(*self.remarks, *remarks))
 
     def _repr_html_(self) -> str:
-        """Return the table of the channels that a notebook shows."""
         rows: list[list[object]] = []
         for name, x in self.channels.items():
             known = x[np.isfinite(x)]

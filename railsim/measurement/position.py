@@ -77,7 +77,6 @@ def position(
 
 
 def _known(file: str, name: str, time: Floats, x: Floats, remarks: list[str]) -> Floats:
-    """Return an axis without gaps."""
     known = np.isfinite(x)
     if known.sum() < 2:
         raise input_error(file, "no values", "a channel with values", key=name)
@@ -90,7 +89,6 @@ def _known(file: str, name: str, time: Floats, x: Floats, remarks: list[str]) ->
 
 
 def _rising(file: str, time: Floats, counter: Floats, remarks: list[str]) -> Floats:
-    """Return a distance that rises strictly."""
     s = _known(file, "distance", time, counter, remarks)
     highest = np.maximum.accumulate(s)
     back = float(np.max(highest - s))

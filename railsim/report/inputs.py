@@ -78,7 +78,6 @@ def _assumed(used: Sequence[Used], whole: str) -> Table:
 
 
 def _either(values: Sequence[str]) -> str:
-    """Return the values that runs have."""
     more = len(values) - MOST_VALUES
     return "; or ".join(values[:MOST_VALUES]) + (f"; and {more} more" if more > 0 else "")
 
@@ -171,7 +170,6 @@ def _number(value: Any) -> Any:
 
 
 def _differences(vehicles: Mapping[str, Any]) -> Table:
-    """Return the keys in which vehicles differ."""
     rows = [[key, *values] for key, values in differing(list(vehicles.values())).items()]
     more = len(rows) - MOST_DIFFERENCES
     return Table(

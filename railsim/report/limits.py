@@ -207,7 +207,6 @@ def _rows(one: Assessment) -> list[Table]:
 
 
 def _influences(one: Assessment) -> Table:
-    """Return the regressions over cant deficiency and curvature."""
     rows: list[list[Cell]] = []
     for found in one.influences:
         rule, solved = found.criterion, found.regression
@@ -256,7 +255,6 @@ def _off(distance: float, on: str, back: str) -> str:
 
 
 def _sources(limits: Any) -> Table:
-    """Return where the number of each limit is from."""
     rows = [
         [one.words, WORDS[one.group], one.meaning, _origin(law)]
         for one in CRITERIA.values()

@@ -268,7 +268,6 @@ def player(result: Analysis) -> tuple[str, dict[str, Any]]:
 
 
 def _sentences(result: Analysis, s: Any) -> list[str]:
-    """Text of the player at each position."""
     order = np.argsort(result.output["travel"])
     columns = [quantity(n, result.definition) for n in ("height", "force") if n in result.output]
     travel, *known = (result.output[name][order] for name in ("travel", *(c.name for c in columns)))

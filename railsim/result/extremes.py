@@ -4,6 +4,7 @@ import math
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import starmap
 from typing import Any
 
 import numpy as np
@@ -209,17 +210,15 @@ def mid_curves(
     if not given. `track`: That of the result; by default it is rebuilt from the text that the
     result carries.
     """
-    wanted = _wanted(result, names)
-    distance = result["distance"]
-    found: list[MidCurve] = []
-    if not len(distance):
+    wanted, distance = _wanted(result, names), result["distance"]
+    if len(distance) < 2 or not distance[0] < distance[-1]:
         return ()
     on = track or result.track()
-    for section in curvature_sections(on):
-        middle = 0.5 * (section.begin + section.end)
-        if section.type == "CIR" and distance[0] <= middle <= distance[-1] > distance[0]:
-            found.append(_mid_curve(result, wanted, section, smooth=not on.irregularities))
-    return tuple(found)
+    return tuple(
+        _mid_curve(result, wanted, one, smooth=not on.irregularities)
+        for one in curvature_sections(on)
+        if one.type == "CIR" and distance[0] <= 0.5 * (one.begin + one.end) <= distance[-1]
+    )
 
 
 def _wanted(result: Result, names: Iterable[str] | None) -> list[str]:
@@ -250,12 +249,17 @@ def _mid_curve(result: Result, names: list[str], section: Section, *, smooth: bo
 
     values = {name: there(name) for name in names}
     time = float(there("time"))
-    largest = [_largest(result, name, array, time, middle) for name, array in values.items()]
+
+    def largest(name: str, array: Floats) -> Peak:
+        index = _extreme(array[None], "abs")[1:]
+        labels = _labels(result, name, index)
+        return Peak(result.quantities[name], float(array[index]), labels, time, middle)
+
     begin, end = _full_curve(result, section)
     first, last = np.searchsorted(distance, begin), np.searchsorted(distance, end, "right")
     medians, scatter, changes = _over_curve(result, slice(int(first), int(last)), values)
-    steady = tuple(_largest(result, name, array, time, middle) for name, array in medians.items())
-    found = values, tuple(largest), medians, scatter, steady, (begin, end)
+    peaks, steady = (tuple(starmap(largest, of.items())) for of in (values, medians))
+    found = values, peaks, medians, scatter, steady, (begin, end)
     unsettled = bool(smooth and len(changes) and np.mean(changes) > 0.5)
     return MidCurve(radius, middle, time, *found, unsettled)
 
@@ -306,13 +310,6 @@ def _settling(values: Floats, medians: Floats) -> Floats:
     above = rows > medians[:, None]
     crossings = np.count_nonzero(above[:, 1:] != above[:, :-1], axis=1)
     return np.asarray((after < SETTLES * before) | (crossings < CROSSINGS))
-
-
-def _largest(result: Result, name: str, array: Floats, time: float, distance: float) -> Peak:
-    """Largest magnitude over the dimensions of a quantity."""
-    index = _extreme(array[None], "abs")[1:]
-    labels = _labels(result, name, index)
-    return Peak(result.quantities[name], float(array[index]), labels, time, distance)
 
 
 def _labels(result: Result, name: str, indices: tuple[Any, ...]) -> dict[str, str]:

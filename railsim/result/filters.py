@@ -175,8 +175,7 @@ def _integral_at(s: Floats, x: Floats, summed: Floats, at: Floats) -> Floats:
     shape = (-1, *(1 for _ in x.shape[1:]))
     d = (at - s[i]).reshape(shape)
     slope = (x[i + 1] - x[i]) / (s[i + 1] - s[i]).reshape(shape)
-    found: Floats = summed[i] + x[i] * d + 0.5 * slope * d**2
-    return found
+    return np.asarray(summed[i] + x[i] * d + 0.5 * slope * d**2)
 
 
 def distance_means(s: Floats, x: Floats, centres: Floats, length: float) -> Floats:

@@ -157,7 +157,6 @@ class _Cycles:
         self.lengths = np.diff(self.starts).astype(np.float64)
 
     def amplitudes(self, record: Floats) -> Floats:
-        """Amplitude of the first harmonic of each cycle in a record."""
         if not len(self.lengths):
             return np.zeros(0)
         first, last = self.starts[0], self.starts[-1]

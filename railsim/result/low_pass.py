@@ -203,7 +203,6 @@ class _Causal:
         self._skip = 0
 
     def take(self, chunk: dict[str, Floats]) -> dict[str, Floats]:
-        """Filtered instants of a further chunk."""
         found = {}
         for name, array in chunk.items():
             passed = array
@@ -218,5 +217,4 @@ class _Causal:
         return found
 
     def end(self) -> dict[str, Floats]:
-        """Nothing is held back."""
         return {}

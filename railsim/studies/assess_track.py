@@ -226,7 +226,7 @@ def assess_track(
         vehicles=[str(v) for v in vehicles], tracks=[str(recording)], speeds=list(speeds),
         single=True, keep=",".join([*quantities, "sensor_acceleration"]),
     )  # fmt: skip
-    outcome = carry_out_cases([run.case for run in runs], spec, folder, **how)
+    outcome = carry_out_cases([case for case, *_ in runs], spec, folder, **how)
     ended = outcome.records.where(lambda status: status != "complete")
     remarks = [f"{one['name']}: {one['status']}, {one['status_reason']}" for one in ended]
     remarks += _left_out(track) + _hunting(outcome.records) + measured_remarks(track)

@@ -212,7 +212,6 @@ def _vehicle(run: RunSpec) -> Vehicle:
 
 
 def _service(run: RunSpec) -> Service:
-    """Return the service table of a run's vehicle, with its assignments."""
     service = _vehicle(run).service
     if service is None:
         allowed = "add [service] with admissible_speed and cant_deficiency"

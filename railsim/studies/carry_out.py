@@ -250,8 +250,7 @@ class State:
         check_laws(law for each in inputs for one in each for law in (one.laws or {}).items())
         if not (execution.resume or execution.trying):
             runs = {point.name: point.run for point in waiting}
-            varied = {*spec.grid, *(key for table in spec.linked for key in table)}
-            _check_settings([c for c in self.cases if c.file_name], runs, varied)
+            _check_settings([c for c in self.cases if c.file_name], runs, spec.combined)
 
     def _is_done(self, point: Point) -> bool:
         """Whether the journal has the result of these inputs, and its file has not changed."""

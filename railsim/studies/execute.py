@@ -24,7 +24,7 @@ from urllib.parse import urlsplit
 
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.errors import ModelError, RailsimError, argument_error, optional_package
-from railsim.files.access import remove_partial_files, sweep, whole_file
+from railsim.files.access import remove_partial_files, sweep, write_folder
 from railsim.processes import WorkerPool, begin_worker, worker_context
 from railsim.result import Result, open_result
 from railsim.result.extremes import OF_FACTS
@@ -304,16 +304,13 @@ def perform_there(job: Job, mark: str) -> tuple[Record, dict[str, bytes]]:
 
 
 def _taken(future: Any, job: Job) -> Record:
-    """Return the record of a job of the cluster after writing its files."""
     try:
+        record: Record
         record, files = future.result()
-        for name, data in files.items():
-            with whole_file(job.path.parent / name) as partial:
-                partial.write_bytes(data)
+        write_folder(job.path.parent, files, overwrite=True)
     except Exception as error:
         return failed_record(job.case, error)
-    found: Record = record
-    return found
+    return record
 
 
 # shared with worker processes: progress and process of all jobs, and whether to stop

@@ -79,8 +79,7 @@ class Plan:
             raise input_error("study", "no combination", "give a vehicle, a track, a speed")
         check_analyses(spec.analyses)
         self._spec = spec
-        varied = {*spec.grid, *(k for t in spec.linked for k in t)}
-        self._loader = Loader(varied, spec.analyses, contacts=True)
+        self._loader = Loader(spec.combined, spec.analyses, contacts=True)
         # hashes of files; each is read once
         self._fingerprint = cache(self._with_overrides)
         self._base, self._content = cache(self._of_file), cache(_content_hash)
@@ -207,7 +206,6 @@ def _file_names(node: Any, of_file: bool = False) -> Iterator[str]:
 
 
 def _named_files(assignment: str) -> Iterator[str]:
-    """Yield the files that an assignment names."""
     key, _, written = assignment.partition("=")
     if not sources.FILE_KEYS & set(key.strip().split(".")):
         return

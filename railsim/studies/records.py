@@ -27,9 +27,10 @@ def kept_record(path: Path | None, remark: Callable[[str], None]) -> Record | No
         return None
     words = f"{path}: the record is damaged"
     try:
-        stored: dict[str, Record] = json.loads(read_text(path, TABLE_BYTES))
-        if stored["crc32"] == _crc(stored["record"]):
-            return stored["record"]
+        stored = json.loads(read_text(path, TABLE_BYTES))
+        record: Record = stored["record"]
+        if stored["crc32"] == _crc(record):
+            return record
     except InputError as error:
         words = str(error)
     except (ValueError, TypeError, KeyError, RecursionError):

@@ -152,8 +152,7 @@ class _Gain:
         dominated = np.ones((len(objectives), len(left)), bool)
         for k in range(objectives.shape[1]):
             dominated &= objectives[:, k, None] <= left[None, :, k]
-        share: Floats = dominated.sum(axis=1) / CELLS
-        return share
+        return np.asarray(dominated.sum(axis=1) / CELLS)
 
     def take(self, row: Floats) -> None:
         """Treat a design as known."""
@@ -178,8 +177,7 @@ class Surrogate:
 
     def __call__(self, points: Floats) -> Floats:
         """Return the predicted values at some points."""
-        found: Floats = self._fit(points) * self._spread + self._middle
-        return found
+        return np.asarray(self._fit(points) * self._spread + self._middle)
 
     def errors(self) -> Floats:
         """Return the leave-one-out error (RMS) of each column, over the standard deviation.
@@ -202,8 +200,8 @@ class Surrogate:
         points = qmc.Sobol(self._designs.shape[1], seed=0).random(SHARES)
         shares = np.bincount(KDTree(self._designs).query(points)[1], minlength=count) / SHARES
         deviation = np.sqrt(shares @ np.square(self._values - shares @ self._values))
-        found: Floats = np.sqrt(shares @ np.square(missed))
-        return found / np.where(deviation > 0.0, deviation, 1.0)
+        error = np.sqrt(shares @ np.square(missed))
+        return np.asarray(error / np.where(deviation > 0.0, deviation, 1.0))
 
 
 def _nsga2(task: Task) -> None:
@@ -280,8 +278,7 @@ METHODS: dict[str, Callable[[Task], None]] = {
 def varied(values: Floats) -> Flags:
     """Return which columns vary by more than round-off, as of eigenvalues."""
     high, low = values.max(axis=0, initial=-np.inf), values.min(axis=0, initial=np.inf)
-    found: Flags = high - low > ROUND_OFF * np.minimum(np.abs(high), np.abs(low))
-    return found
+    return np.asarray(high - low > ROUND_OFF * np.minimum(np.abs(high), np.abs(low)))
 
 
 def non_dominated(values: Floats) -> Flags:

@@ -43,7 +43,6 @@ class RunSpec:
 
 
 def _several(values: Any) -> list[Any]:
-    """Return one or several values as a list."""
     several = isinstance(values, Iterable) and not isinstance(values, str)
     return list(values) if several else [values]
 
@@ -139,10 +138,14 @@ class StudySpec(BaseModel):
         return self.model_copy(update=changes)
 
     @property
+    def combined(self) -> set[str]:
+        """Keys of grid and linked tables."""
+        return {*self.grid, *(key for table in self.linked for key in table)}
+
+    @property
     def overruled(self) -> list[str]:
         """Assignments whose keys vary, so that no run has their values."""
-        varied = {*self.grid, *(key for table in self.linked for key in table)}
-        varied |= {*self.sample.parameters} if self.sample else set()
+        varied = self.combined.union(self.sample.parameters if self.sample else ())
         return [one for one in self.assignments if one.partition("=")[0].strip() in varied]
 
     def stored(self) -> dict[str, Any]:

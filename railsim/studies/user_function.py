@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from runpy import run_path
 
 from railsim.errors import RailsimError, argument_error
 from railsim.files.access import TABLE_BYTES, read_bytes
@@ -93,16 +93,12 @@ def user_quantities(name: str | None, result: Result) -> dict[str, float]:
 def _loaded(name: str, _: str) -> Function:
     """Load a function; the hash of its file has it loaded anew when that has changed."""
     file, _, function = name.rpartition(":")
-    spec = spec_from_file_location(f"railsim_quantities_{Path(file).stem}", file)
     try:
-        assert spec is not None  # of a .py file
-        assert spec.loader is not None
-        module = module_from_spec(spec)
-        spec.loader.exec_module(module)
+        names = run_path(file, run_name=f"railsim_quantities_{Path(file).stem}")
     except Exception as error:
         found = f"cannot be loaded ({type(error).__name__}: {error})"
         raise argument_error(PARAMETER, found, ALLOWED, key=file) from None
-    loaded: Function | None = getattr(module, function, None)
+    loaded: Function | None = names.get(function)
     if not callable(loaded):
         raise argument_error(PARAMETER, f"no function '{function}'", ALLOWED, key=file)
     try:
