@@ -144,10 +144,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             echo(f"remark: {sentence}", err=True)
         sys.stdout.flush()
     except BrokenPipeError:
-        interrupts.silence(sys.stdout)
+        interrupts.silence()
         return DONE
     except OSError as error:  # nobody can read what is printed: a full disk behind `>`
-        interrupts.silence(sys.stdout)
+        interrupts.silence()
         with suppress(OSError):
             echo(f"railsim: {words_of(error)}", err=True)
         return FAILED

@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from io import TextIOWrapper
 from types import FrameType
-from typing import TextIO
 
 from railsim.cli.terminal import echo
 from railsim.files.access import remove_partial_files
@@ -150,9 +149,9 @@ def usable_streams() -> None:
                 stream.reconfigure(errors="backslashreplace")
 
 
-def silence(stream: TextIO) -> None:
-    """Let what a stream still holds go nowhere: its reader has gone, or its disk is full."""
+def silence() -> None:
+    """Let what stdout still holds go nowhere: its reader has gone, or its disk is full."""
     with suppress(OSError, ValueError):
         null = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(null, stream.fileno())
+        os.dup2(null, sys.stdout.fileno())
         os.close(null)

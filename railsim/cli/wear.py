@@ -37,10 +37,8 @@ def amount_options(name: str, text: str, unit: str) -> Decorator:
     """Options of the distance or tonnage to run, and of that of one step."""
     amount = name.split()[0].strip("-").capitalize()
     between = f"{amount} in {unit} between two profiles written; each 0.1 mm updates them, too."
-    return cli.together(
-        cli.option(name, text, unit.upper(), float, required=True),
-        cli.option("--step", between, unit.upper(), float, required=True),
-    )
+    each = (name, text), ("--step", between)
+    return cli.together(*(cli.option(*one, unit.upper(), float, required=True) for one in each))
 
 
 law_option = cli.option(

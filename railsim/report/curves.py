@@ -8,7 +8,7 @@ a quantity.
 """
 
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from railsim.arrays import Floats
 from railsim.definitions.track.layout import curvature_sections
 from railsim.notation import plain_symbol
 from railsim.plot.selection import STUDY, limit_of
-from railsim.result import Result
+from railsim.result import Result, Results
 from railsim.text import printable
 
 CELLS = 6400  # of the horizontal axis; the page draws fewer, and more where it is zoomed
@@ -26,7 +26,7 @@ MISSING = 65535  # code for no value
 STANDS_STILL = 1.0  # m; below it the time is the horizontal axis
 
 
-def groups(results: Mapping[str, Result]) -> list[dict[str, Result]]:
+def groups(results: Results) -> list[dict[str, Result]]:
     """Group results, by the names of their runs, by alignment; omit runs without instants."""
     found: dict[tuple[Any, ...], dict[str, Result]] = {}
     for name, result in results.items():
@@ -38,7 +38,7 @@ def groups(results: Mapping[str, Result]) -> list[dict[str, Result]]:
     return list(found.values())
 
 
-def curve_data(results: Mapping[str, Result], cells: int = CELLS) -> dict[str, Any]:
+def curve_data(results: Results, cells: int = CELLS) -> dict[str, Any]:
     """Return the curves of runs over the same alignment as plain data for the page.
 
     `cells`: Number of cells of the horizontal axis.
@@ -75,7 +75,7 @@ def _sections(result: Result) -> list[dict[str, Any]]:
 
 
 def _quantity(
-    results: Mapping[str, Result], name: str, over: str, edges: Floats, wheelsets: int
+    results: Results, name: str, over: str, edges: Floats, wheelsets: int
 ) -> dict[str, Any] | None:
     """Return one quantity of all runs in the units of plots; None where no run has it."""
     having = [result for result in results.values() if name in result]
@@ -146,7 +146,7 @@ def coded(values: Floats) -> tuple[float, float, str]:
     return low, high, b64encode(codes.tobytes()).decode()
 
 
-def cells_of(found: Sequence[Mapping[str, Result]]) -> int:
+def cells_of(found: Sequence[Results]) -> int:
     """Return the number of cells of all curves for which the page stays small."""
     each = ([len(result.wheelsets) for result in results.values()] for results in found)
     lines = 9 * sum(len(numbers) * max(numbers) for numbers in each)

@@ -19,7 +19,7 @@ from railsim.profiles import Profile
 from railsim.report.document import Drawing, Section, Table, of_values
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
 from railsim.report.spread import number
-from railsim.result import Result
+from railsim.result import Results
 from railsim.simulation.assumptions import assumptions
 from railsim.text import in_words, printable
 from railsim.units import number_with_unit
@@ -43,7 +43,7 @@ class Used(NamedTuple):
     speed: float
 
 
-def inputs_of(records: Sequence[Record], results: Mapping[str, Result]) -> list[Used]:
+def inputs_of(records: Sequence[Record], results: Results) -> list[Used]:
     """Return the inputs of results."""
     labels = {record["name"]: record["labels"] for record in records}
     found = []
@@ -82,9 +82,7 @@ def _either(values: Sequence[str]) -> str:
     return "; or ".join(values[:MOST_VALUES]) + (f"; and {more} more" if more > 0 else "")
 
 
-def what_was_run(
-    used: Sequence[Used], results: Mapping[str, Result], inputs: Mapping[str, Any]
-) -> Section:
+def what_was_run(used: Sequence[Used], results: Results, inputs: Mapping[str, Any]) -> Section:
     """Return the section of the page about vehicles, tracks, inputs and settings."""
     section = Section("Inputs", id="inputs")
     vehicles: dict[str, Any] = {}
@@ -126,7 +124,7 @@ def _named(one: Vehicle | Track, label: str) -> str:
     return "" if one.name == label else f"{one.name}. "
 
 
-def _at_rest(results: Mapping[str, Result]) -> list[Table]:
+def _at_rest(results: Results) -> list[Table]:
     """Return how the vehicles of the results stand at rest, each in its load case."""
     vehicles: list[tuple[Vehicle, Mapping[str, Profile]]] = []
     for result in results.values():
@@ -179,7 +177,7 @@ def _differences(vehicles: Mapping[str, Any]) -> Table:
     )  # fmt: skip
 
 
-def _settings(results: Mapping[str, Result]) -> Table:
+def _settings(results: Results) -> Table:
     """Return a table of the settings of the runs, with differences from the default."""
     usual = dict(flat_keys(Settings().model_dump()))
     found: dict[str, dict[str, None]] = {}

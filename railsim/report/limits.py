@@ -1,7 +1,7 @@
 """Tables of the values of runs with the limits of standards and the meaning of each limit."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from railsim.compare import differing
 from railsim.errors import InputError, listed
 from railsim.profiles.used import used_profiles
 from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table, of_values
-from railsim.result import Result
+from railsim.result import Results
 from railsim.result.sensors import sensors
 from railsim.table import beside
 from railsim.text import printable
@@ -42,7 +42,7 @@ MOST_TOLD = 3  # values that tell vehicles of one name apart; else the names of 
 MOST = 256  # runs that are assessed; more would take long
 
 
-def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[str, str]], Section]:
+def assessed(results: Results) -> tuple[list[tuple[str, str]], Section]:
     """Assess all runs as `railsim assess` does, also those that are sampled too coarsely.
 
     EN 14363 as far as the runs cover its zones; Nadal's limit for each run.  Returns: the kind
@@ -90,7 +90,7 @@ def remark_table(words: Sequence[str]) -> Table:
     return Table(["remark"], [[word] for word in words], "Remarks on these values")
 
 
-def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessment], list[str]]:
+def _assessed(runs: Results, standard: str) -> tuple[list[Assessment], list[str]]:
     """Assess vehicle by vehicle, so that missing quantities of one do not affect the others."""
     found: list[Assessment] = []
     remarks: list[str] = []
@@ -102,7 +102,7 @@ def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessmen
     return found, [*remarks, *(remark for one in found for remark in one.remarks)]
 
 
-def _told_apart(assessments: Sequence[Assessment], runs: Mapping[str, Result]) -> list[Assessment]:
+def _told_apart(assessments: Sequence[Assessment], runs: Results) -> list[Assessment]:
     """Assessments of vehicles of one name, with the values that differ or their runs' names."""
     found = list[Assessment]()
     for one in assessments:
@@ -225,7 +225,7 @@ def _influences(one: Assessment) -> Table:
     )  # fmt: skip
 
 
-def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
+def _setup(one: Assessment, runs: Results) -> Table:
     """Return what was tested: vehicle, measuring points, profiles."""
     vehicle = runs[one.runs[0]].vehicle()
     service = vehicle.service
@@ -268,7 +268,7 @@ def _origin(of: Any) -> str:
     return of.source if of.checked or of.source == "ours" else f"{of.source}, unchecked"
 
 
-def _gathered(remarks: Sequence[str], runs: Mapping[str, Result]) -> list[str]:
+def _gathered(remarks: Sequence[str], runs: Results) -> list[str]:
     """Return remarks as sentences, equal remarks on several runs once."""
     by_text: dict[str, list[str]] = {}
     for remark in remarks:

@@ -1,6 +1,6 @@
 """Published values and those of a run with the same vehicle, track and speed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isclose
 
@@ -10,7 +10,7 @@ from railsim.definitions.loading import load, load_track, load_vehicle
 from railsim.definitions.published import Published, PublishedValue
 from railsim.files.sources import library_files
 from railsim.notation import SIDES
-from railsim.result import Result
+from railsim.result import Result, Results
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Beside:
         return (abs(self.found) - abs(self.published)) / abs(self.published)
 
 
-def beside_published(results: Mapping[str, Result]) -> list[Beside]:
+def beside_published(results: Results) -> list[Beside]:
     """Return every published value that the runs can be compared with.
 
     A run is compared if vehicle and speed are those of the publication and its track differs at
@@ -43,7 +43,7 @@ def beside_published(results: Mapping[str, Result]) -> list[Beside]:
     return [row for study in studies for row in _of_study(study, results)]
 
 
-def _of_study(study: Published, results: Mapping[str, Result]) -> Sequence[Beside]:
+def _of_study(study: Published, results: Results) -> Sequence[Beside]:
     track = load_track(study.track)
     names = dict.fromkeys(name for value in study.values for name in value.values)
     vehicles = {name: load_vehicle(name) for name in names}

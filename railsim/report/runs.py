@@ -26,7 +26,7 @@ from railsim.report.curves import cells_of, curve_data, groups
 from railsim.report.inputs import Used, inputs_of, units_of, what_was_run
 from railsim.report.limits import assessed, remark_table
 from railsim.report.published import beside_published
-from railsim.result import Result
+from railsim.result import Results
 from railsim.text import printable
 from railsim.version import __version__
 
@@ -42,9 +42,9 @@ MOST_UNITS = 4  # runs whose inputs say the units of what was varied
 def page(
     title: str,
     records: Sequence[Record],
-    results: Mapping[str, Result],
+    results: Results,
     remarks: Sequence[str] = (),
-    assessable: Mapping[str, Result] | None = None,
+    assessable: Results | None = None,
     inputs: Mapping[str, Any] | None = None,
     used: Sequence[Used] = (),
     assessments: Sequence[Assessment] = (),
@@ -103,7 +103,7 @@ def _done(records: Sequence[Record]) -> list[Record]:
     return [record for record in records if record.get("peaks") or record.get("quantities")]
 
 
-def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
+def _lead(records: Sequence[Record], results: Results) -> str:
     parts = [f"{len(records)} run{'s' * (len(records) != 1)}"]
     if len(records) == len(results) == 1:
         parts += [result.title for result in results.values()]
@@ -144,7 +144,7 @@ def _verdict(
     return [{"kind": kind, "text": words} for kind, words in (first, *verdicts)]
 
 
-def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> doc.Section:
+def _peaks(records: Sequence[Record], results: Results) -> doc.Section:
     """Peaks of the shown runs side by side, with position and time."""
     shown = [record for record in _done(records) if record["name"] in results]
     rows: dict[tuple[str, str], list[doc.Cell]] = {}
@@ -213,7 +213,7 @@ def _assessed(assessment: Assessment) -> doc.Section:
     return section
 
 
-def _curves(number: int, records: Sequence[Record], results: Mapping[str, Result]) -> doc.Section:
+def _curves(number: int, records: Sequence[Record], results: Results) -> doc.Section:
     if not number:
         text = "The results hold none of the quantities that are drawn here."
         return doc.Section("Along the track", [text], id="curves")
@@ -255,7 +255,7 @@ def _spread(
     return section
 
 
-def _published(results: Mapping[str, Result]) -> list[doc.Section]:
+def _published(results: Results) -> list[doc.Section]:
     """Published values beside those of the runs, where there are any."""
     rows = beside_published(results)
     tables = []

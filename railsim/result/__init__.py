@@ -13,13 +13,13 @@
 Begin reading in `data.py`.
 """
 
-from railsim.result.data import Result
+from railsim.result.data import Result, Results
 from railsim.result.extremes import MidCurve, Peak, mid_curves, peak, peaks
 from railsim.result.hdf5 import Hdf5Sink
 from railsim.result.reading import check_result, open_result, open_run
 from railsim.result.sinks import MemorySink, Sink
 
 __all__ = [
-    "Hdf5Sink", "MemorySink", "MidCurve", "Peak", "Result", "Sink", "check_result", "mid_curves",
-    "open_result", "open_run", "peak", "peaks",
+    "Hdf5Sink", "MemorySink", "MidCurve", "Peak", "Result", "Results", "Sink", "check_result",
+    "mid_curves", "open_result", "open_run", "peak", "peaks",
 ]  # fmt: skip

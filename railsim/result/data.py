@@ -437,6 +437,10 @@ class Result:
                 yield ":".join((name, *labels)), unit, values
 
 
+Results = Mapping[str, Result]
+"""Results by the names of their runs."""
+
+
 class FrozenArrays(Mapping[str, Floats]):
     """Read-only arrays by name."""
 

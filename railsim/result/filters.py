@@ -33,13 +33,12 @@ REACH = 6.0
 
 
 @lru_cache(50)
-def butterworth(low: float = 0.0, high: float = math.inf, order: int = 4) -> Response:
-    """Magnitude of a Butterworth low pass, high pass or band pass.
+def butterworth(low: float = 0.0, high: float = math.inf) -> Response:
+    """Magnitude of a Butterworth low pass, high pass or band pass of order 4.
 
-    `low`, `high`: Lower and upper corner [Hz]; 0 and infinity: none. `order`: Order; a band pass
-    has it on either side, as the transformation of the low pass gives it. Returns: Frequencies
-    [Hz] to 1/sqrt(1 + x^(2 order)), x = f/high, low/f or, of a band pass, (f^2 - low high)/(f
-    (high - low)).
+    `low`, `high`: Lower and upper corner [Hz]; 0 and infinity: none. A band pass has the order on
+    either side, as the transformation of the low pass gives it. Returns: Frequencies [Hz] to
+    1/sqrt(1 + x^8), x = f/high, low/f or, of a band pass, (f^2 - low high)/(f (high - low)).
 
     >>> [round(float(g), 3) for g in butterworth(high=20.0)(np.array([10.0, 20.0, 30.0]))]
     [0.998, 0.707, 0.194]
@@ -52,9 +51,9 @@ def butterworth(low: float = 0.0, high: float = math.inf, order: int = 4) -> Res
             above, below = f**2 - low * high, f * (high - low)
         elif low > 0.0:
             above, below = np.full_like(f, low), f
-        # 1/sqrt(1 + (above/below)^2n) written for f = 0 too
+        # 1/sqrt(1 + (above/below)^8) written for f = 0 too
         top = np.maximum(np.abs(above), np.abs(below))
-        above, below = (above / top) ** order, (below / top) ** order
+        above, below = (above / top) ** 4, (below / top) ** 4
         return np.abs(below) / np.hypot(above, below)
 
     return gain
@@ -127,9 +126,9 @@ def even_step(time: Floats) -> float | None:
     return float(np.mean(steps))
 
 
-def low_passed(x: Floats, rate: float, corner: float, *, causal: bool = False) -> Floats:
-    """Butterworth low pass of order 4 without phase, or causal."""
-    return band_passed(x, rate, 0.0, corner, causal=causal)
+def low_passed(x: Floats, rate: float, corner: float) -> Floats:
+    """Butterworth low pass of order 4 without phase."""
+    return band_passed(x, rate, 0.0, corner)
 
 
 def band_passed(x: Floats, rate: float, low: float, high: float, *, causal: bool = False) -> Floats:

@@ -112,9 +112,7 @@ class Hdf5Sink(sinks.Sink):
             raise InputError([fault]) from None
 
     def begin(
-        self,
-        coordinates: Mapping[str, Sequence[str]],
-        quantities: Iterable[Quantity] = sinks.ALWAYS,
+        self, coordinates: sinks.Coordinates, quantities: Iterable[Quantity] = sinks.ALWAYS
     ) -> None:
         """See `Sink.begin`."""
         self._quantities = {quantity.name: quantity for quantity in quantities}

@@ -9,7 +9,7 @@ Time and distance are taken as they are.  `Y_over_Q` is made of the filtered Y a
 exist while a wheel does not touch is held for the filter, and does not exist there afterwards.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import cache
 
 import numpy as np
@@ -18,7 +18,7 @@ from railsim.arrays import Floats
 from railsim.notation import Quantity
 from railsim.result.data import Attributes
 from railsim.result.filters import outward_quotient, steady_start
-from railsim.result.sinks import ALWAYS, Sink, SinkBefore
+from railsim.result.sinks import ALWAYS, Coordinates, Sink, SinkBefore
 
 ATTENUATION = 80.0  # dB
 UNFILTERED = ("time", "distance", "mileage", "curvature", "cant")
@@ -50,9 +50,7 @@ class LowPassSink(SinkBefore):
         self._last: float | None = None
         self._held: dict[str, Floats] = {}
 
-    def begin(
-        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
-    ) -> None:
+    def begin(self, coordinates: Coordinates, quantities: Iterable[Quantity] = ALWAYS) -> None:
         """See `Sink.begin`."""
         wanted = tuple(quantities)
         self._names = tuple(q.name for q in wanted if "time" in q.dims)

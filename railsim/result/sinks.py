@@ -30,6 +30,7 @@ FORMAT = "railsim-result/2"
 ALWAYS = tuple(QUANTITIES.values())
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 EVERYTHING = ("*",)
+Coordinates = Mapping[str, Sequence[str]]  # names along the dimensions
 
 
 class Sink(Protocol):
@@ -44,9 +45,7 @@ class Sink(Protocol):
     def __exit__(self, *_: object) -> None:
         self.abort()
 
-    def begin(
-        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
-    ) -> None:
+    def begin(self, coordinates: Coordinates, quantities: Iterable[Quantity] = ALWAYS) -> None:
         """Say what will come.
 
         `coordinates`: Names along the dimensions ``wheelset`` and ``body``, and along any further
@@ -82,9 +81,7 @@ class SinkBefore(Sink):
     def __init__(self, sink: Sink) -> None:
         self._sink = sink
 
-    def begin(
-        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
-    ) -> None:
+    def begin(self, coordinates: Coordinates, quantities: Iterable[Quantity] = ALWAYS) -> None:
         """See `Sink.begin`."""
         self._sink.begin(coordinates, quantities)
 
@@ -117,9 +114,7 @@ class MemorySink(Sink):
         self._coordinates: dict[str, tuple[str, ...]] = {}
         self._chunks: dict[str, list[Floats]] = {}
 
-    def begin(
-        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
-    ) -> None:
+    def begin(self, coordinates: Coordinates, quantities: Iterable[Quantity] = ALWAYS) -> None:
         """See `Sink.begin`."""
         self._quantities = {q.name: q for q in quantities if matches(q.name, self._only)}
         self._coordinates = full_coordinates(coordinates)
@@ -151,10 +146,10 @@ class MemorySink(Sink):
         self._chunks = {}
 
 
-def full_coordinates(coordinates: Mapping[str, Sequence[str]]) -> dict[str, tuple[str, ...]]:
+def full_coordinates(coordinates: Coordinates) -> dict[str, tuple[str, ...]]:
     """Return the coordinates of a run with the ones that are always the same."""
-    known: dict[str, Sequence[str]] = {"side": SIDES, "component": COMPONENTS}
-    return {name: tuple(labels) for name, labels in (known | dict(coordinates)).items()}
+    known: Coordinates = {"side": SIDES, "component": COMPONENTS}
+    return {name: tuple(labels) for name, labels in {**known, **coordinates}.items()}
 
 
 def matches(name: str, patterns: Iterable[str]) -> bool:

@@ -25,7 +25,7 @@ from railsim.result.hdf5 import PLAIN, Storage
 from railsim.result.sinks import EVERYTHING
 from railsim.simulation import simulate
 from railsim.simulation.conditions import check_agreement, check_range, initial_speed
-from railsim.studies.spec import RunSpec
+from railsim.studies.spec import Progress, RunSpec
 from railsim.version import __version__
 
 
@@ -194,13 +194,10 @@ class Loader:
         with found.caught():
             check_agreement(vehicle, track, settings, speed, short_name(run.vehicle))
         wheelsets = (w for group in groups(vehicle) for w in group.wheelsets.values())
-        sides = ((w, side) for w in wheelsets for side in range(2))
-        of_track = track.gauge, track.inclination
-        for pair in dict.fromkeys(
-            (w.profile[k], w.radius[k], w.back_to_back, track.rail[k], *of_track)
-            for w, k in sides
-            if self._contacts
-        ):
+        sides = ((w, side) for w in wheelsets for side in range(2) if self._contacts)
+        of = track.gauge, track.inclination
+        pairs = ((w.profile[k], w.radius[k], w.back_to_back, track.rail[k], *of) for w, k in sides)
+        for pair in dict.fromkeys(pairs):
             words = f"{short_name(run.vehicle)} on {short_name(run.track)}"
             found += [replace(one, file=words) for one in self._misfits(*pair)]
         for name, analysis in self._analyses.items():
@@ -244,7 +241,7 @@ def run_case(
     path: str | Path | None,
     *,
     overwrite: bool,
-    progress: Callable[[float], None] | None,
+    progress: Progress | None,
     resume: Result | None = None,
     only: Collection[str] = EVERYTHING,
     storage: Storage = PLAIN,

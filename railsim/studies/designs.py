@@ -17,7 +17,7 @@ from railsim.errors import Fault, Faults, nearest
 from railsim.studies.plan import selects
 from railsim.studies.records import Record
 from railsim.studies.search import Values
-from railsim.studies.spec import Execution, StudySpec
+from railsim.studies.spec import Execution, Progress, StudySpec
 from railsim.studies.study import run_study
 from railsim.studies.summary import summary_row, unit_of
 
@@ -25,8 +25,6 @@ _LOG = logging.getLogger(__name__)
 _MAGNITUDE = re.compile(r"\w+_(?:peak|mid\d*|median\d*)(?:_20hz)?")
 DIGITS = 6  # of the values of variables, more where the range is narrow
 INPUTS = "optimise.toml"
-
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)

@@ -35,14 +35,13 @@ from railsim.simulation.first_start import compile_time_loop, is_compiled
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case, run_case
 from railsim.studies.records import Record
+from railsim.studies.spec import Progress
 from railsim.studies.summary import failed_record, finished_record, waiting_record
 
 GRACE = 3.0  # seconds that running jobs have to stop
 POLL = 0.2  # seconds between updates of the progress
 AHEAD = 8  # jobs for each process that wait in its pool: each end takes a look at all of them
 ALWAYS_KEPT = ("time", "distance", "Q0")
-
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
@@ -65,8 +64,8 @@ class Job:
         return self.keep == EVERYTHING and not self.storage.single
 
 
-class Stopped(Exception):
-    """The study was interrupted."""
+class Stopped(BaseException):
+    """The study was interrupted, which is no failure of a run."""
 
 
 def perform(job: Job, progress: Progress | None = None) -> Record:
@@ -90,8 +89,6 @@ def perform(job: Job, progress: Progress | None = None) -> Record:
 
             save(histories(result), job.picture, overwrite=True)
         return {**finished_record(case, result, job.function), "file": _reduced(job, result)}
-    except Stopped:
-        raise
     except Exception as error:
         return failed_record(case, error)
 

@@ -32,7 +32,6 @@ from railsim.studies.designs import (
     INPUTS,
     Design,
     Evaluation,
-    Progress,
     name_of,
     of_the_runs,
     share_of,
@@ -43,7 +42,7 @@ from railsim.studies.designs import (
 from railsim.studies.plan import ROUGH_DURATION, check_number, check_study, faults_of_file
 from railsim.studies.search import METHODS, Task, knee, non_dominated
 from railsim.studies.sensitivity import Sensitivity, sensitivities
-from railsim.studies.spec import Execution, checked
+from railsim.studies.spec import Execution, Progress, checked
 from railsim.studies.summary import unit_of
 from railsim.table import Column, Table
 from railsim.text import plain
@@ -85,10 +84,10 @@ class Optimisation:
         """Return all designs with variables, objectives and constraints [SI]."""
         values = values_by_name(self.definition, self.designs)
         on_front = {design.number for design in self.front}
-        variables = [
-            Column(path, path.removeprefix("vehicle."), self.units[path], ".5g")
-            for path in self.definition.variables
-        ]
+        units = self.units.items()
+        variables = (
+            Column(path, path.removeprefix("vehicle."), unit, ".5g") for path, unit in units
+        )
         columns = [Column("design", format="d"), *variables]
         columns += [Column(name, format=".5g") for name in values]
         numbers = zip(*values.values(), strict=True)
@@ -134,10 +133,8 @@ class Optimisation:
     def _shown(self, shown: Sequence[Design], marked: Design, mark: str) -> Table:
         """Some rows of the table, `mark` beside one of them."""
         designs, ends = self.table(), 3  # feasible, front and reason are for spreadsheets
-        rows = [
-            [mark if design is marked else "", *designs.rows[design.number - 1][:-ends]]
-            for design in shown
-        ]
+        rows = [["", *designs.rows[design.number - 1][:-ends]] for design in shown]
+        rows[shown.index(marked)][0] = mark
         return Table(["", *designs.columns[:-ends]], rows)
 
     def record(self) -> dict[str, Any]:

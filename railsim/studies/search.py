@@ -268,7 +268,7 @@ def _differential_evolution(task: Task) -> None:
     )
 
 
-METHODS: dict[str, Callable[[Task], None]] = {
+METHODS = {
     "surrogate": _surrogate,
     "nsga2": _nsga2,
     "differential_evolution": _differential_evolution,

@@ -23,6 +23,7 @@ from railsim.units import ALLOWED
 from railsim.version import __version__
 
 M = TypeVar("M", bound=BaseModel)
+Progress = Callable[[float], None]
 MOST_FAULTS = 20
 MOST_RUNS = 200_000
 
@@ -165,7 +166,7 @@ class Execution:
     longest_first: bool = False  # to balance the load of the cores
     beside: tuple[str, ...] = ()  # files written beside the runs: those of others are refused
     trying: bool = False  # a run that cannot be computed is an outcome like others
-    progress: Callable[[float], None] | None = None
+    progress: Progress | None = None
     on_record: Callable[[dict[str, Any]], None] | None = None
     on_remark: Callable[[str], None] | None = None
 

@@ -21,10 +21,9 @@ from railsim.processes import WorkerPool, available_cores
 from railsim.profiles.used import profile_hashes
 from railsim.stability.critical_speed import checked, critical_speed
 from railsim.studies.records import Record, kept_record, write_record
+from railsim.studies.spec import Progress
 from railsim.table import Column, Table
 from railsim.version import __version__
-
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)

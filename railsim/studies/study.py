@@ -20,7 +20,7 @@ from railsim.studies.journal import JOURNAL, Journal
 from railsim.studies.outcome import Outcome
 from railsim.studies.plan import Plan
 from railsim.studies.records import Record
-from railsim.studies.spec import Execution, StudySpec, checked
+from railsim.studies.spec import Execution, Progress, StudySpec, checked
 from railsim.studies.summary import read_index, refuse_too_many
 from railsim.studies.user_function import Function, full_name
 from railsim.version import __version__
@@ -50,7 +50,7 @@ def study(
     keep: str = "all",
     compress: bool = False,
     single: bool = False,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
     on_record: Callable[[Record], None] | None = None,
     on_remark: Callable[[str], None] | None = None,
 ) -> Outcome:

@@ -35,6 +35,7 @@ from railsim.result.hunting import HUNTS
 from railsim.simulation import simulate
 from railsim.simulation.conditions import SPEED_RANGE
 from railsim.studies.records import kept_record, write_record
+from railsim.studies.spec import Progress
 from railsim.version import __version__
 
 AMPLITUDE = 3e-3  # m, at which EN 15302 compares equivalent conicities
@@ -111,7 +112,7 @@ class Loop:
     folder: Path | None = None
     on_step: Callable[[WearStep], None] | None = None
     on_remark: Callable[[str], None] | None = None
-    progress: Callable[[float], None] | None = None
+    progress: Progress | None = None
 
 
 def wear_loop(
@@ -326,7 +327,7 @@ def _wear(
     law: WearLaw,
     worn: Mapping[str, Profile],
     at: float,
-    progress: Callable[[float], None],
+    progress: Progress,
 ) -> tuple[dict[str, Floats], dict[str, str]]:
     """Depth of wear per distance or tonnage, mean of the runs weighted by their shares.
 
