@@ -59,7 +59,11 @@ def command(
         elif not quiet and count % 10 == 0:
             echo(f"{count} runs simulated", err=True)
 
-    how |= {"band": _band(band), "place": not fixed_place, "folder": folder and folder / KEPT}
+    try:
+        low, high = map(float, band.split(":"))
+    except ValueError:
+        raise input_error("--band", f"'{band}'", "LOW:HIGH in Hz, such as 0.5:30") from None
+    how |= {"band": (low, high), "place": not fixed_place, "folder": folder and folder / KEPT}
     found = identify(vehicle, measured, keys, progress=progress, **how)
     if folder:
         from railsim.report import measured as report
@@ -74,11 +78,3 @@ def command(
     tables = (found.table(), found.correlation_table(), found.residual_table())
     parts = [part for table in tables for part in ("", table)]
     output.answer(found.record(), [*parts, "", *found.unidentified], found.remarks)
-
-
-def _band(text: str) -> tuple[float, float]:
-    try:
-        low, high = map(float, text.split(":"))
-    except ValueError:
-        raise input_error("--band", f"'{text}'", "LOW:HIGH in Hz, such as 0.5:30") from None
-    return low, high

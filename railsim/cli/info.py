@@ -2,16 +2,13 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 from railsim.cli import common as cli
 from railsim.files.access import PICTURES, RESULTS, STUDY_FILES, check_file
 from railsim.plottable import Plottable
-
-if TYPE_CHECKING:
-    from railsim.definitions.base import Remark
 
 DRAWN = "--draw is for vehicles and tracks"
 
@@ -51,7 +48,7 @@ def command(
     cli.goes_with(
         "vehicles and tracks", not (result or runs), "assignments", "load", "speeds", "static"
     )
-    remarks: list[Remark] = []
+    remarks: list[Any] = []
     if runs:
         from railsim.studies.gathered import described_runs
 

@@ -3,7 +3,7 @@
 import os
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -11,9 +11,6 @@ from railsim.cli import common as cli
 from railsim.cli.terminal import echo, print_json
 from railsim.errors import Faults, fault_lines
 from railsim.files.access import RESULTS, is_file
-
-if TYPE_CHECKING:
-    from railsim.definitions.base import Remark
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
 
@@ -52,7 +49,7 @@ def command(files: tuple[str, ...], output: cli.Output) -> int:
     return cli.WRONG_INPUT if any(report["faults"] for report in reports) else cli.DONE
 
 
-def checked(file: str) -> "tuple[str, list[Remark]]":
+def checked(file: str) -> tuple[str, list[Any]]:
     """Check one file and return its kind and the remarks on it.
 
     Raises InputError: all its faults.

@@ -293,7 +293,17 @@ def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ..
         found = f"the {len(chain)}th file in a chain"
         raise input_error(path, found, f"{LONGEST_CHAIN} at most", key="extends")
     base = _extended(read_toml(base_path), base_path, kind, (*chain, base_path.resolve()))
-    Faults(fault for key in removed for fault in _remove(base, key, str(path))).check()
+    faults = Faults()
+    for key in removed:
+        try:
+            parent, last = descend(base.data, key_path(key))
+            if isinstance(parent, dict) and last not in parent:
+                raise KeyError(nearest(last, parent))
+            del parent[last]
+        except KeyError as missing:
+            found, allowed = f"no key {key!r} in {base.file}", str(missing.args[0])
+            faults.append(Fault(str(path), "remove", found, allowed))
+    faults.check()
     if kind == "limits":
         Faults(_of_others(base.data, data, (), str(path))).check()
     _merge(base.data, data, (), base.origin, str(path))
@@ -333,13 +343,11 @@ def _without_extends(
     removed = data.pop("remove", [])
     faults = Faults()
     if base is not None and not isinstance(base, str):
-        faults.append(
-            Fault(str(path), "extends", shortened(repr(base)), "a path or the name of a file")
-        )
+        found, allowed = shortened(repr(base)), "a path or the name of a file"
+        faults.append(Fault(str(path), "extends", found, allowed))
     if not isinstance(removed, list) or not all(isinstance(key, str) for key in removed):
-        faults.append(
-            Fault(str(path), "remove", shortened(repr(removed)), "a list of dotted key paths")
-        )
+        found, allowed = shortened(repr(removed)), "a list of dotted key paths"
+        faults.append(Fault(str(path), "remove", found, allowed))
     elif removed and base is None:
         faults.append(Fault(str(path), "remove", "no 'extends'", "'remove' goes with 'extends'"))
     faults.check()
@@ -374,17 +382,6 @@ def replace_origin(
         origin.pop(known, None)
     origin[path] = file
     origin.update(dict.fromkeys(_paths(value, path), file))
-
-
-def _remove(base: Source, key: str, file: str) -> list[Fault]:
-    try:
-        parent, last = descend(base.data, key_path(key))
-        if isinstance(parent, dict) and last not in parent:
-            raise KeyError(nearest(last, parent))
-        del parent[last]
-    except KeyError as missing:
-        return [Fault(file, "remove", f"no key {key!r} in {base.file}", str(missing.args[0]))]
-    return []
 
 
 def _anchor_files(node: Any, folder: Path, keys: set[str]) -> None:

@@ -32,10 +32,9 @@ def position(
     speed = axes.get("speed")
     if speed is None and how.speed is not None and not {"distance", "mileage"} & {*axes}:
         speed = np.full(len(time), how.speed)
-    if speed is not None:
-        speed = _known(file, "speed", time, speed, remarks)
     driven = None
     if speed is not None:
+        speed = _known(file, "speed", time, speed, remarks)
         driven = np.concatenate([[0.0], np.cumsum(0.5 * step * (speed[1:] + speed[:-1]))])
     counter = axes.get("distance")
     if counter is None and "mileage" in axes:

@@ -183,9 +183,12 @@ class Hdf5Sink(sinks.Sink):
                 self._contents.store(name, array, _about(quantity), quantity.dims)
         for name, profile in profiles.items():
             _write_profile(self._contents, name, profile)
-        for group, arrays in _of_quantities(groups, self._quantities).items():
-            if group == PEAKS:
-                _write_names(self._contents, f"{PEAKS}/extreme", EXTREMES)
+        for group, arrays in groups.items():
+            if group == PEAKS:  # of the quantities that are kept only
+                kept = self._quantities
+                arrays = {n: a for n, a in arrays.items() if sinks.peak_quantity(n) in kept}
+                if arrays:
+                    _write_names(self._contents, f"{PEAKS}/extreme", EXTREMES)
             for name, array in arrays.items():
                 about, dims = _about_peak(name) if group == PEAKS else ({}, ())
                 self._contents.store(f"{group}/{name}", frozen(array), about, dims)
@@ -237,17 +240,6 @@ def write(
         statics = {name: result[name] for name in selected if "time" not in selected[name].dims}
         sink.close(result.attributes, statics, result.profiles, result.groups)
     return sink.path
-
-
-def _of_quantities(
-    groups: Mapping[str, Mapping[str, Any]], quantities: Mapping[str, Quantity]
-) -> dict[str, Mapping[str, Any]]:
-    """Groups of a result, with the peaks of the quantities that it keeps only."""
-    kept: dict[str, Mapping[str, Any]] = dict(groups)
-    if PEAKS in kept:
-        of_run = kept[PEAKS].items()
-        kept[PEAKS] = {n: array for n, array in of_run if sinks.peak_quantity(n) in quantities}
-    return {group: arrays for group, arrays in kept.items() if arrays}
 
 
 def _write_names(contents: Contents, dim: str, labels: Sequence[str]) -> None:

@@ -262,7 +262,10 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
             raise argument_error("choose", f"design {choose}", f"1 to {len(designs)}")
         chosen = designs[choose - 1]
     about = evaluation.folder, wanted, designs, tuple(front), chosen
-    units = _units(evaluation.definition, wanted)
+    definition = evaluation.definition
+    overrides = split_overrides(definition.assignments)["vehicle"]
+    vehicle = load_vehicle(definition.vehicles[0], overrides)
+    units = {path: unit_of_key(vehicle, path.removeprefix("vehicle.")) for path in wanted.variables}
     found = Optimisation(
         *about,
         _active(wanted, chosen, designs, units) if chosen else (),
@@ -271,7 +274,7 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
         evaluation.computed,
         units,
     )
-    _write(found, evaluation.definition.name)
+    _write(found, definition.name)
     return found
 
 
@@ -284,13 +287,6 @@ def _sensitivities(evaluation: Evaluation, chosen: Design) -> Sequence[Sensitivi
     values = values_by_name(wanted, evaluation.designs, name_of)
     columns, middle = np.transpose(list(values.values())), shares[chosen.number - 1]
     return sensitivities(shares, columns, middle, list(wanted.variables), list(values))
-
-
-def _units(definition: Study, wanted: Optimise) -> dict[str, str]:
-    """Return the units of the variables by their paths, those of the first vehicle."""
-    overrides = split_overrides(definition.assignments)["vehicle"]
-    vehicle = load_vehicle(definition.vehicles[0], overrides)
-    return {path: unit_of_key(vehicle, path.removeprefix("vehicle.")) for path in wanted.variables}
 
 
 def _active(

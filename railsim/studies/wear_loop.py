@@ -130,7 +130,11 @@ def wear_loop(
     no route, or a route without a share; no step; too much wear in a step. ModelError: a run ended
     early; names profile, distance and track.
     """
-    name = _profile_name(vehicle)
+    names = {name for _, name, _ in used_profiles(vehicle)}
+    if len(names) != 1:
+        found = f"{len(names)} wheel profiles"
+        raise input_error("vehicle", found, "the same for all wheels", key="profile")
+    (name,) = names
     runs = [Run(vehicle, *route) for route in routes]
 
     def depths(result: Result, law: WearLaw) -> dict[str, Floats]:
@@ -271,14 +275,6 @@ def row(distance: float, worn: Profile, lost: Floats) -> dict[str, float | None]
         "deepest": float(lost[at]),
         "deepest_y": float(worn.y[at]) if lost[at] else None,
     }
-
-
-def _profile_name(vehicle: Vehicle) -> str:
-    names = {name for _, name, _ in used_profiles(vehicle)}
-    if len(names) != 1:
-        found = f"{len(names)} wheel profiles"
-        raise input_error("vehicle", found, "the same for all wheels", key="profile")
-    return names.pop()
 
 
 def _check(wearing: Wearing, how: Loop) -> None:
