@@ -205,18 +205,17 @@ class Settings(FileDefinition):
 
     def unusual(self) -> list[base.Remark]:
         """Return values beside which another takes their place."""
-        fields, found = type(self).model_fields, self.drive.unusual()
-        if self.output_spacing is not None and self.output_rate != fields["output_rate"].default:
-            found.append(
-                base.Remark("output_rate", "has no effect: output_spacing takes its place")
-            )
+        found, grid = self.drive.unusual(), type(self).model_fields["fastsim_grid"].default
         gridded = CREEP_LAWS[self.creep_law].grid and self.own_creep_law is None
-        if not gridded and self.fastsim_grid != fields["fastsim_grid"].default:
+        if not gridded and self.fastsim_grid != grid:
             found.append(base.Remark("fastsim_grid", "has no effect: the creep law has no cells"))
         return found
 
     @base.check
     def _physical(self) -> None:
+        usual = type(self).model_fields["output_rate"].default
+        if self.output_spacing is not None and self.output_rate != usual:
+            raise ValueError("either 'output_rate' or 'output_spacing', not both")
         if self.poisson >= 0.5:
             raise ValueError("'poisson' must be below 0.5")
         if (self.creep_law == "adhesion_curve") != (self.adhesion_curve is not None):

@@ -481,6 +481,7 @@ def test_wrong_value_is_refused_for_it_alone(change):
         {"drive": {"mode": "table", "speed_table": [[0.0, 0.0]]}},
         {"drive": {"mode": "table", "speed_table": [[10.0, 5.0], [0.0, 5.0]]}},
         {"drive": {"resistance": [1.0, 0.0, 0.0]}},
+        {"output_spacing": 0.5, "output_rate": 500.0},
         {"drive": {"mode": "free", "resistance": [-1.0, 0.0, 0.0]}},
         {"drive": {"mode": "free", "traction_table": [[-1.0, 5.0]]}},
     ],
@@ -495,7 +496,6 @@ def test_wrong_setting_is_refused_for_it_alone(change):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"output_spacing": 0.5, "output_rate": 500.0}, ["output_rate"]),
         ({"creep_law": "table", "fastsim_grid": [20, 20]}, ["fastsim_grid"]),
         ({"creep_law": "fastrip", "fastsim_grid": [20, 20]}, []),
         ({"output_spacing": 0.5, "creep_law": "polach"}, []),
