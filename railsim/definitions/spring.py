@@ -17,6 +17,7 @@ from railsim.errors import Fault, nearest
 Row = tuple[base.NonNegative, base.Positive]
 
 
+TARE = "ODM"  # usual name of the tare load; not looked for where nothing uses it
 _NUMBER = {"type": "number", "exclusiveMinimum": 0}
 _ROW = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 
@@ -128,7 +129,7 @@ class Fatigue(base.Definition):
     """Highest dynamic load [N]; by default the tare load + 20 %"""
     min_load: base.Positive | None = None
     """Lowest dynamic load [N]; by default the tare load - 35 %"""
-    tare: base.Text = "ODM"
+    tare: base.Text = TARE
     """Name of the tare load among `loads`"""
     goodman: Polyline
     """Rows [tau_min, tau_max] of the Goodman-Smith line [Pa]"""
@@ -344,9 +345,9 @@ def _load_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
         named.append(("vehicle.load", suspension.vehicle.load))
     if fatigue is not None:
         highest, lowest = fatigue.max_load, fatigue.min_load
-        if highest is None or lowest is None:
+        if None in (highest, lowest) or fatigue.tare != TARE:
             named.append(("fatigue.tare", fatigue.tare))
-        elif highest <= lowest:
+        if highest is not None and lowest is not None and highest <= lowest:
             found = f"{highest:.12g} N is not above fatigue.min_load {lowest:.12g} N"
             yield Fault("", "fatigue.max_load", found, "the highest dynamic load")
     for key, name in named:

@@ -159,6 +159,12 @@ def test_tables_for_people(capsys):
         ("verify", ["outer.mean_diametre=0.2"], "outer.mean_diametre", "mean_diameter"),
         ("fatigue", ["fatigue.max_load=30e3"], "fatigue.max_load", "highest"),
         ("fatigue", ["fatigue.max_load=200e3"], "fatigue.max_load", "solid height"),
+        (
+            "verify",
+            ["fatigue.max_load=120e3", "fatigue.min_load=60e3", "fatigue.tare=odm"],
+            "fatigue.tare",
+            "no load 'odm' in [loads]; allowed: A.S.,",
+        ),
         ("fatigue", ["fatigue.goodman=[[0.0, 4e8]]"], "fatigue.goodman", ""),
         # kg/mm2 in place of Pa
         ("verify", ["material.G=8000", "material.E=21000"], "mounting.load", "solid height"),
