@@ -271,6 +271,8 @@ class Mechanism(FileDefinition):
     """Numbers that may be varied, in SI and rad, or expressions of others"""
     derived: dict[base.Name, parts.Quantity] = base.EMPTY_TABLE
     """Intermediate results by name, for use in other expressions"""
+    choices: dict[base.Name, tuple[base.Finite, ...]] = base.EMPTY_TABLE
+    """Parameters that may have some values only, with these, as the sign of an assembly"""
     provenance: dict[base.Name, tuple[base.Name, ...]] = base.EMPTY_TABLE
     """Parameters by where they are from: printed, derived, reconstructed, new, ..."""
     units: dict[base.Text, tuple[base.Name, ...]] = base.EMPTY_TABLE

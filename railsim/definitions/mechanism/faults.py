@@ -103,6 +103,7 @@ def _parameter_faults(mechanism: Mechanism) -> Iterator[Fault]:
         **{f"cases.{case}": names for case, names in mechanism.cases.items()},
         **{f"provenance.{home}": names for home, names in mechanism.provenance.items()},
         **{f"units.{unit}": names for unit, names in mechanism.units.items()},
+        "choices": mechanism.choices,
         "tolerances": mechanism.tolerances,
         "optimise.bounds": optimise.bounds if optimise else (),
         "optimise.assemblies": optimise.assemblies if optimise else (),
@@ -242,6 +243,9 @@ def _range_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[F
         if not 0.0 < angle < 0.5 * np.pi:
             allowed = "above 0 and below pi/2 rad: angles are folded to it"
             yield _fault("optimise.min_transmission_angle", f"{angle:g}", allowed)
+    for name, choices in mechanism.choices.items():
+        if (found := values.get(name, "auto")) not in choices:
+            yield _fault(f"parameters.{name}", str(found), " or ".join(map("{:g}".format, choices)))
     for name, tolerance in mechanism.tolerances.items():
         if not (value := number(tolerance, values)) >= 0.0:
             yield _fault(f"tolerances.{name}", f"{value:g}", "0 or greater: it is plus and minus")
@@ -255,19 +259,20 @@ def _least_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[F
     """Values that are too small, at the parameter that says it where there is just one."""
     for at, part in members(Definition, mechanism):
         for field, least in least_values(type(part)).items():
-            quantity = getattr(part, field)
-            if quantity is None:
-                continue
-            value = number(quantity, values)
-            if value > least.value or (value == least.value and not least.excluded):
-                continue
-            key, found = f"{at}.{field}", f"{value:g}"
-            if isinstance(quantity, Expression):
-                if str(quantity) in quantity.names:
-                    key, found = f"parameters.{quantity}", f"{value:g} (as {key})"
-                else:
-                    found = f"'{quantity}' is {value:g}"
-            yield _fault(key, found, least.allowed)
+            given = getattr(part, field)
+            for quantity in given if isinstance(given, tuple) else (given,):
+                if quantity is None:
+                    continue
+                value = number(quantity, values)
+                if value > least.value or (value == least.value and not least.excluded):
+                    continue
+                key, found = f"{at}.{field}", f"{value:g}"
+                if isinstance(quantity, Expression):
+                    if str(quantity) in quantity.names:
+                        key, found = f"parameters.{quantity}", f"{value:g} (as {key})"
+                    else:
+                        found = f"'{quantity}' is {value:g}"
+                yield _fault(key, found, least.allowed)
 
 
 def _row_faults(key: str, row: CatalogueRow, values: Mapping[str, Any]) -> Iterator[Fault]:

@@ -52,6 +52,8 @@ class Least(NamedTuple):
 
 Positive = Annotated[Quantity, Least(0.0, "greater than 0", excluded=True)]
 NonNegative = Annotated[Quantity, Least(0.0, "0 or greater")]
+# where the law of the makers, 0.36 % per degree from 20 C on, leaves a force
+Temperature = Annotated[Quantity, Least(-257.0, "-257 C or above: the gas has no force below")]
 Progression = Annotated[Quantity, Least(1.0, "1 or greater: the gas is compressed")]
 
 
@@ -438,13 +440,13 @@ class GasSpring(Definition):
     """Damping over the last part of the extension (oil) [N s/m]"""
     end_length: Quantity = 0.0
     """Length of that part [m]"""
-    temperature: Annotated[Quantity, Least(-273.15, "above -273.15 C", excluded=True)] = 20.0
+    temperature: Temperature = 20.0
     """Temperature of the gas [C]"""
     rod: Positive | None = None
     """Diameter of the rod [m], for the pressure of the gas"""
     rod_end: PointName | None = None
     """Point at which the rod is; it should be the lower one when compressed"""
-    service: tuple[Quantity, Quantity] = (-30.0, 80.0)
+    service: tuple[Temperature, Temperature] = (-30.0, 80.0)
     """Lowest and highest temperature in service [C]"""
 
 
