@@ -39,6 +39,7 @@ LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 COARSE, FINE = 0.1, 3e-5  # of the sum of squares; of it and of the coordinates
 SILENT = 1e-3  # of the noise of a channel: change that is none
 FIRST = 0.05  # of the rms of a channel: least noise that is taken for the first weights
+NEGLIGIBLE = 1e-3  # of the rms of a channel: residuals whose whiteness says nothing of the model
 SETTLED = 0.05  # change of a weight
 MOST_STEPS = 30
 CLOSE, MOST_TIMES = 0.1, 4  # standard deviations; times that derivatives are taken at the solution
@@ -336,8 +337,10 @@ def _outcome(
         problem.series(x), strict=True,
     )  # fmt: skip
     for one, rows, weights, before, after in series:
-        for j, (name, row) in enumerate(zip(one.names, rows, strict=True)):
-            test = whiteness(row) if problem.form.kind == "history" else (np.nan, np.nan)
+        wholes = problem.form.features(one, one.measured, measured=True)
+        for j, (name, row, whole) in enumerate(zip(one.names, rows, wholes, strict=True)):
+            tested = problem.form.kind == "history" and _rms(row) > NEGLIGIBLE * _rms(whole)
+            test = whiteness(row) if tested else (np.nan, np.nan)
             channels.append(Channel(
                 one.run.name, name, one.run.selections[j], one.step, one.run.at,
                 one.measured[j], before[j], after[j], _rms(weights[j] * row), *test,

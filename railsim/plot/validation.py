@@ -153,8 +153,8 @@ def residual_spectra(found: Identified) -> Figure:
         summed = np.cumsum(power[inside]) / max(float(power[inside].sum()), 1e-300)
         axes.plot([low, high], [0.0, 1.0], color="0.6", linewidth=0.8)
         axes.plot(f[inside], summed, color=DISTINCT[0] if one.is_white else LIMIT)
-        white = "white" if one.is_white else "not white"
-        axes.set(title=f"{one.name}: {white}")
+        judged = "white" if one.is_white else "not white"
+        axes.set(title=f"{one.name}: {judged if one.probability >= 0.0 else 'not judged'}")
         axes.set(xlabel="frequency (Hz)", ylabel="share of the power")
     return figure
 

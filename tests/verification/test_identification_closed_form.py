@@ -345,6 +345,18 @@ def test_residuals_are_white_where_chance_gives_their_statistic_once_in_a_hundre
     assert one.is_white is white
 
 
+@pytest.mark.parametrize("stated", [True, False])
+def test_residuals_of_data_without_noise_are_not_judged(stated):
+    """They are the round-off of the search, of some colour, and say nothing of the model."""
+    ready = runs(np.random.default_rng(7), 0.0)
+    if not stated:
+        ready = [replace(one, noise=np.full(2, np.nan)) for one in ready]
+    one = identified(ready, [Parameter(name, (name,)) for name in TRUE])
+    assert one.factors == pytest.approx(list(TRUE.values()), rel=1e-9)
+    assert all(np.isnan(channel.probability) for channel in one.channels)
+    assert not one.remarks
+
+
 def test_pictures_name_their_run_and_lines_differ_in_black_and_white():
     s = np.arange(600.0)
     one = Channel("run 12", "Q1L", "Q:1:left", 0.02, s, s, s, s, 1.0, 1.6, 0.5)
