@@ -368,16 +368,17 @@ def vibration_cause(
 
     `hunts`: the vehicle; `uneven`: wheels are not round; `irregular`: the rails; `varying`: their
     support; `struck`: there are check rails, whose blow or friction may be the cause; `centred`: no
-    wheelset leaves the middle of the track; `slides`: there is friction.
+    wheelset leaves the middle of the track; `slides`: there is friction.  Of what is there only it
+    is not known how much it excites; where none of it is, what is left must be the cause.
     """
     if hunts:
         return "the vehicle hunts"
     if uneven:
-        return "excited by wheels that are not round"
+        return "perhaps excited by wheels that are not round"
     if irregular:
-        return "excited by the irregularities or sections of the rails"
+        return "perhaps excited by the irregularities or sections of the rails"
     if varying:
-        return "excited by the support of the rails, which varies along the track"
+        return "perhaps excited by the support of the rails, which varies along the track"
     if centred:
         return "excited by the gradient, by applied forces or by the start, on smooth rails"
     if not slides:
