@@ -79,7 +79,9 @@ def result_parts(result: Result, remarks: Sequence[str] = ()) -> list[str | Tabl
     facts = result.attributes
     end = f"{result.status}: {facts['status_reason']}"
     if len(result["time"]):
-        end += f"; t = {result['time'][-1]:.2f} s, s = {result['distance'][-1]:.1f} m"
+        end += (
+            f"; last output at t = {result['time'][-1]:.3f} s, s = {result['distance'][-1]:.2f} m"
+        )
     else:
         end += "; at its start, before the first instant was recorded"
     parts: list[str | Table] = [

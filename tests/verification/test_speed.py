@@ -9,6 +9,7 @@ from selection import points
 import railsim
 from railsim.errors import Fault, InputError
 from railsim.result import open_result
+from railsim.result.tables import result_parts
 from railsim.simulation import Simulation, preparation, run_in, simulate
 
 RAMP = ((0.0, 10.0), (50.0, 10.0), (150.0, 30.0), (200.0, 30.0))
@@ -54,6 +55,21 @@ def test_speed_table_is_met(bogie, straight):
     # mean over an interval of 5 ms against the table's value in its middle: V'' dt^2/24 < 1e-5
     expected = np.interp(middle, *np.array(RAMP).T)
     assert np.max(np.abs(speeds(result) - expected)[smooth]) < 1e-4
+
+
+def test_run_passes_its_end_by_less_than_a_step_and_says_where_its_last_output_lies(
+    bogie, straight
+):
+    """Outputs have equal steps of time: the last one lies up to 5 ms before the end."""
+    result = simulate(bogie, straight, settings=in_table(), until=110.0)
+    s, v = result.groups["state"]["end"][-2:]
+    assert 110.0 <= s < 110.0 + v * result.attributes["step"] * 1.001
+    last = result.distance[-1]
+    assert last < 110.0 < last + v / 200.0
+    assert (
+        f"complete: the run reached its end; last output at t = {result.time[-1]:.3f} s, "
+        f"s = {last:.2f} m" in result_parts(result)[0]
+    )
 
 
 @pytest.mark.parametrize(
