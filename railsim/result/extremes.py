@@ -335,6 +335,7 @@ def run_facts(result: Result, track: Track | None = None) -> dict[str, Any]:
     return {
         **{name: result.attributes[name] for name in FACTS if name in result.attributes},
         "remarks": list(result.remarks),
+        "hunts": "hunting_frequency" in result.attributes,
         "peaks": [peak.record() for peak in peaks(result)],
         "mid_curves": [curve.record() for curve in mid_curves(result, track=track)],
     }

@@ -35,7 +35,6 @@ from railsim.files.access import check_folder, write_folder
 from railsim.notation import SIDES
 from railsim.result import Result, open_result
 from railsim.result.filters import low_passed, outward_quotient
-from railsim.result.hunting import HUNTS
 from railsim.result.sensors import sensors
 from railsim.simulation.conditions import SPEED_RANGE
 from railsim.studies.carry_out import carry_out_cases
@@ -238,8 +237,7 @@ def _hunting(records: Sequence[Mapping[str, Any]]) -> list[str]:
     runs: dict[tuple[str, float], list[bool]] = {}
     for record in records:
         labels = record["labels"]
-        hunts = any(words.startswith(HUNTS) for words in record.get("remarks", ()))
-        runs.setdefault((labels["vehicle"], labels["speed"]), []).append(hunts)
+        runs.setdefault((labels["vehicle"], labels["speed"]), []).append(record.get("hunts", False))
     return [
         f"{vehicle} hunts at {3.6 * speed:.0f} km/h in {sum(hunts)} of {len(hunts)} pieces: what "
         "it exceeds there is due to the vehicle, and where a piece begins it need not hunt yet."

@@ -222,9 +222,9 @@ def test_the_strip_is_red_where_a_limit_is_exceeded_and_nowhere_else():
 def test_vehicles_that_hunt_are_said():
     """What they exceed is not the track's; a vehicle that does not hunt is not named."""
     labels = {"vehicle": "wagon", "speed": 40.0}
-    other = {"labels": {"vehicle": "coach", "speed": 40.0}, "remarks": ["Values are low-passed."]}
-    hunts = {"labels": labels, "remarks": ["The vehicle hunts at 5.7 Hz, 7.4 mm, ..."]}
-    (words,) = module._hunting([hunts, {"labels": labels, "remarks": []}, other])
+    other = {"labels": {"vehicle": "coach", "speed": 40.0}, "hunts": False}
+    failed = {"labels": labels, "status": "failed"}
+    (words,) = module._hunting([{"labels": labels, "hunts": True}, failed, other])
     assert words.startswith("wagon hunts at 144 km/h in 1 of 2 pieces")
 
 

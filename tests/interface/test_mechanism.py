@@ -333,6 +333,8 @@ def test_search_without_a_solution_gives_the_least_broken_compromise(capsys):
          "parameters.front_progression", "1 or greater"),
         ("tilting_one_spring", ["parameters.front_extended=0.29"], "elements.front",
          "in extension"),
+        ("atr95_lift_4", ["parameters.a2=0.01"], "derived.slide_in",
+         "the links cannot be assembled"),
         ("atr95_lift_4", ["parameters.assembly=0.5"], "parameters.assembly", "0.5; 1 or -1"),
         ("atr95_lift_5", ["optimise.objective=best"], "optimise.objective", "'peak_force'"),
         ("atr95_lift_5", [f"joints.rocker.length='{'9' * 400}'"],

@@ -11,6 +11,7 @@ from selection import points
 from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.expressions import Expression, evaluate
+from railsim.definitions.mechanism.values import number
 from railsim.errors import InputError
 from railsim.mechanisms.components import AirSpringTable, gas_spring_force, lid_force
 from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, reactions
@@ -245,6 +246,17 @@ def test_no_text_is_more_than_arithmetic(text):
         evaluate(parsed, dict.fromkeys(allowed, 1.5))
     except ValueError:
         return
+
+
+@pytest.mark.parametrize(
+    ("text", "opens"),
+    [("acos(a)", True), ("sqrt(1 - a)", True), ("(1 - a)**0.5", True), ("1 / acos(a - 1)", False)],
+)
+def test_only_what_leaves_its_domain_is_told_as_links_that_cannot_be_assembled(text, opens):
+    """A division by zero is another fault, whatever functions stand beside it."""
+    with pytest.raises(InputError) as caught:
+        number(Expression(text), {"a": 2.0})
+    assert ("cannot be assembled" in caught.value.faults[0].allowed) is opens
 
 
 @pytest.mark.parametrize(

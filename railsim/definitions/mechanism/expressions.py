@@ -53,6 +53,10 @@ GRAMMAR = f"numbers, names of parameters, + - * / **, parentheses, pi, {', '.joi
 _KNOWN = {"__builtins__": {}} | {f"{name}()": function for name, function in FUNCTIONS.items()}
 
 
+class OutsideDomain(ValueError):
+    """A root of a negative number, or an angle whose sine or cosine is beyond 1."""
+
+
 class Expression(str):
     """The text of an expression, already parsed.
 
@@ -155,7 +159,7 @@ def evaluate(expression: Expression, values: Mapping[str, Any]) -> Any:
         for node in reversed(parts):  # innermost first
             is_function = isinstance(node, ast.Name) and node.id in FUNCTIONS
             if not is_function and _value(_compiled(node), values) is None:
-                raise ValueError(_reason(node, values))
+                raise _failure(node, values)
     raise ValueError(f"'{expression}' is not finite")
 
 
@@ -173,20 +177,20 @@ def _value(code: CodeType, values: Mapping[str, Any]) -> Any:
     return value if fine else None
 
 
-def _reason(node: ast.expr, values: Mapping[str, Any]) -> str:
+def _failure(node: ast.expr, values: Mapping[str, Any]) -> ValueError:
     """Why an expression with finite parts has no value."""
     text = f"'{ast.unparse(node)}'"
     match node:
         case ast.BinOp(op=ast.Div(), right=right) if np.any(_real(right, values) == 0.0):
-            return f"{text} divides by zero"
+            return ValueError(f"{text} divides by zero")
         case ast.BinOp(op=ast.Pow(), left=left) if np.any(_real(left, values) < 0.0):
-            return f"{text} is a root of a negative number"
+            return OutsideDomain(f"{text} is a root of a negative number")
         case ast.Call(func=ast.Name(id="sqrt"), args=[argument]):
-            return f"{text}: root of {np.min(_real(argument, values)):.6g}"
+            return OutsideDomain(f"{text}: root of {np.min(_real(argument, values)):.6g}")
         case ast.Call(func=ast.Name(id="asin" | "acos"), args=[argument]):
             worst = np.ravel(_real(argument, values))[0]
-            return f"{text}: the argument is {worst:.6g}, not from -1 to 1"
-    return f"{text} is not finite"
+            return OutsideDomain(f"{text}: the argument is {worst:.6g}, not from -1 to 1")
+    return ValueError(f"{text} is not finite")
 
 
 def _real(node: ast.expr, values: Mapping[str, Any]) -> Any:

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from railsim.definitions.mechanism.definition import Mechanism
-from railsim.definitions.mechanism.expressions import Expression, evaluate
+from railsim.definitions.mechanism.expressions import Expression, OutsideDomain, evaluate
 from railsim.definitions.mechanism.parts import Link, Polar, Prismatic, Slot
 from railsim.errors import input_error
 
@@ -73,7 +73,7 @@ def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> A
         return evaluate(quantity, values)
     except ValueError as error:
         hint = ""
-        if "acos" in str(error) or "asin" in str(error) or "root" in str(error):
+        if isinstance(error, OutsideDomain):
             hint = "the links cannot be assembled at the start with these parameters"
         raise input_error("", str(error), hint, key=key) from None
 
