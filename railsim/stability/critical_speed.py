@@ -26,7 +26,7 @@ from railsim.profiles import Profile
 from railsim.simulation.auxiliary_track import DOING
 from railsim.stability.branches import RESOLUTION, Branch, Point, first_beyond, jumps, lowest_of
 from railsim.stability.continuation import followed_branches
-from railsim.stability.diagram import diagram, speeds_about
+from railsim.stability.diagram import diagram, speeds_about, unresolved
 from railsim.stability.motion import LeftRange, VehicleMotion
 from railsim.stability.ramp import EXCITATIONS, SMALL, Progress, below, ramp, tops_above
 from railsim.stability.result import Conicity, CriticalSpeed, LinearLoss, OverAmplitude
@@ -391,6 +391,7 @@ def _by_diagram(
     progress: Progress,
 ) -> None:
     speeds = speeds_about(unstable, found.low, found.high, points)
+    found.remarks += filter(None, [unresolved(speeds, unstable)])
     branches = diagram(motion, speeds, progress, excitations, found.low)
     if not branches[0].points:
         raise LeftRange(f"the vehicle derails at {speeds[0]:.4g} m/s, the lowest speed")

@@ -35,6 +35,7 @@ MOST_LINGERING = 20  # s of a run that decides for one of two motions
 ARRIVED = 0.9  # share of the way between the two at which it has
 AROUND = (0.8, 1.25)  # times the speeds where rest is left: where most of a diagram's stand ...
 SHARE = 0.75  # ... this share of them
+COARSE = 0.05  # of a speed where rest is left: distance of the speeds about it that is said
 
 
 def speeds_about(unstable: Sequence[float], low: float, high: float, points: int) -> list[float]:
@@ -47,6 +48,22 @@ def speeds_about(unstable: Sequence[float], low: float, high: float, points: int
     near = round(SHARE * points)
     above = np.linspace(most, high, points - near + 1)[1:]
     return [*np.linspace(least, most, near).tolist(), *above.tolist()]
+
+
+def unresolved(speeds: Sequence[float], unstable: Sequence[float]) -> str:
+    """Remark on speeds of a diagram that are far apart about those where rest is left [m/s].
+
+    A small motion that begins there and ends or jumps before the next speed is not seen.
+    """
+    gaps = [(b - a, v) for a, b in pairwise(speeds) for v in unstable if a <= v < b]
+    wide = [(gap, v) for gap, v in gaps if gap > COARSE * v]
+    if not wide:
+        return ""
+    gap, speed = max(wide)
+    return (
+        f"bifurcation: about {speed:.4g} m/s, where rest is left, its speeds are {gap:.2g} m/s "
+        "apart: a motion of a narrower range may be missed (--points)"
+    )
 
 
 def diagram(

@@ -31,7 +31,7 @@ from railsim.stability.critical_speed import (
     _remark_range,
     critical_speed,
 )
-from railsim.stability.diagram import diagram, speeds_about
+from railsim.stability.diagram import diagram, speeds_about, unresolved
 from railsim.stability.motion import OUTPUT_RATE, LeftRange, Stretch
 from railsim.stability.ramp import ramp, sustained
 from railsim.stability.result import Conicity, CriticalSpeed, OverAmplitude
@@ -97,6 +97,10 @@ def test_three_quarters_of_a_diagrams_speeds_lie_near_the_linear_critical_speed(
     Where a sway is undamped at 40 m/s as long as friction sticks, from 0.8 times that.
     """
     assert speeds_about([40.0, 60.0], 20.0, 120.0, 16)[0] == 32.0
+    # 0.45 of the speed among 11 gaps are 4 % of it, among 2 they are 23 %
+    assert not unresolved(speeds_about([60.0], 20.0, 120.0, 16), [60.0])
+    words = unresolved(speeds_about([60.0], 20.0, 120.0, 4), [60.0])
+    assert words.startswith("bifurcation: about 60 m/s, where rest is left, its speeds are 14 m/s")
     speeds = speeds_about([60.0], 20.0, 120.0, 16)
     assert speeds[:12] == pytest.approx(np.linspace(48.0, 75.0, 12))
     assert speeds[12:] == pytest.approx([86.25, 97.5, 108.75, 120.0])
