@@ -98,7 +98,7 @@ class Jump:
     direction: str  # of the change of speed
     speed: float  # of the last motion before [m/s]
     amplitude: float  # of that motion [m]
-    to: float  # amplitude of the motion after [m]
+    to: float  # amplitude of the motion after, 0 of rest [m]
 
 
 @dataclass(frozen=True)
@@ -132,9 +132,8 @@ def jumps(branches: Sequence[Branch]) -> list[Jump]:
             wide = abs(after.amplitude - before.amplitude) > SMALLEST_JUMP
             near = abs(after.speed - before.speed) <= RESOLUTION
             if wide and near and far_apart(before.amplitude, after.amplitude):
-                found.append(
-                    Jump(branch.direction, before.speed, before.amplitude, after.amplitude)
-                )
+                to = after.amplitude if after.hunts else 0.0
+                found.append(Jump(branch.direction, before.speed, before.amplitude, to))
     return found
 
 

@@ -230,8 +230,10 @@ def _between(motion: Motion, before: Point, after: Point) -> list[Point]:
     if near or before.amplitude < THRESHOLD or not far_apart(before.amplitude, after.amplitude):
         return []
     middle = 0.5 * (before.speed + after.speed)
+    # near a fold what dies does so slowly: where rest follows, it is not waited for to the last
+    known = [0.0] if after.amplitude < THRESHOLD else []
     try:
-        here = seen_at(middle, settled(motion, before.state, before.speed, middle))
+        here = seen_at(middle, settled(motion, before.state, before.speed, middle, known))
     except LeftRange:
         return []
     return [*_between(motion, before, here), here, *_between(motion, here, after)]

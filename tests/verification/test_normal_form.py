@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from railsim.stability.branches import Branch, Point, far_apart, jumps, lowest_of
+from railsim.stability.branches import THRESHOLD, Branch, Point, far_apart, jumps, lowest_of
 from railsim.stability.diagram import _below, diagram, settled, speeds_about
 from railsim.stability.motion import LeftRange, Stretch
 from railsim.stability.ramp import excited, looked_at, moved, ramp, tops_above
@@ -96,7 +96,14 @@ def test_the_jump_down_is_at_the_fold(branches):
     (down,) = [jump for jump in jumps(branches) if jump.direction == "down"]
     assert down.speed == pytest.approx(FOLD, abs=0.15)
     assert down.amplitude == pytest.approx(hunting(FOLD)[0], rel=0.15)
-    assert down.to < 1e-4
+    assert down.to == 0.0
+
+
+def test_what_dies_beside_the_fold_is_not_waited_for_to_the_last(branches):
+    """It lingers there: below 50 um it is at rest, as it is at the next speed."""
+    died = [point.amplitude for point in branches[1].points if 44.0 < point.speed < FOLD]
+    assert died
+    assert all(5e-6 < amplitude < THRESHOLD for amplitude in died)
 
 
 def test_only_changes_within_the_resolution_are_jumps():
