@@ -174,15 +174,15 @@ def approach(model: Model, track: Track, start: float, speed: float, step: float
     """Steps to run on the real track before the start.
 
     Irregular rails need a certain time.  A transition, a ramp, a vertical curve or a range of
-    `_changing` is entered as in a run over the whole track: from the last position before it where
-    curvature, cant, gradient and rails under the whole vehicle are constant.
+    `_changing`, at the start or at the beginning of that time, is entered as in a run over the
+    whole track: from the last position before it where curvature, cant, gradient and rails under
+    the whole vehicle are constant.
     """
     system = model.system
     room = start + float(np.min(system.frame_offset)) - system.track.s_start - SMOOTH
     along = alignment_of(track), _changing(model.rails.ends, system.support.variation, track)
-    way = _way_from_constant(*along, start, system.frame_offset, room, speed)
-    if _displaced(model, start):
-        way = max(way, APPROACH_TIME * speed, APPROACH)
+    way = max(APPROACH_TIME * speed, APPROACH) if _displaced(model, start) else 0.0
+    way += _way_from_constant(*along, start - way, system.frame_offset, room - way, speed)
     return max(0, math.floor(min(way, room) / (speed * step)))
 
 

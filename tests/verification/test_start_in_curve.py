@@ -218,6 +218,19 @@ def test_a_start_where_support_or_friction_changes_is_that_of_a_run_from_before(
         )
 
 
+def test_way_to_a_start_on_uneven_rails_begins_before_the_transition():
+    """The left rail 5 mm outwards all along: wheelsets within 10 um where the whole run has them.
+
+    60 m before the start the vehicle is in the middle of the transition, twisted between curves.
+    """
+    coach = railsim.load_vehicle("coach_manchester")
+    wide = railsim.load_track("curve_r250").replace(gauge_widening=[[0.0, 5e-3, 0.0]])
+    here = railsim.simulate(coach, wide, speed=15.0, start=390.0, duration=0.01)
+    way = railsim.simulate(coach, wide, speed=15.0, start=200.0, until=390.0)
+    np.testing.assert_allclose(here.wheelset_lateral[0], way.wheelset_lateral[-1], atol=1e-5)
+    np.testing.assert_allclose(here.Q[0], way.Q[-1], atol=5e-4 * way.Q.max())
+
+
 def test_arms_turn_about_their_bushes_where_wheelsets_are_put_on_irregular_rails():
     """The end of the arm, x ahead of the axle and y beside it, stays at its height and at rest."""
     rough = {"type": "random", "spectrum": "erri_b176_high", "seed": 3, "fade": 0.0}
