@@ -184,7 +184,7 @@ class Stability:
     `system`, `state`: the model on straight and level track; steady rolling there; `scheme`: key of
     `SCHEMES`; `curving`: takes a step that is stable on straight track; returns systems and settled
     states in the tightest curve: none where there is no flange contact, or one that has to have the
-    margin, and perhaps a second one for which half of it (its root) is enough; `on_straight`: takes
+    margin, and perhaps others for which half of it (its root) is enough; `on_straight`: takes
     a step and what judges it on straight track, and returns the judgement; `steady`: whether no
     wheel is set ringing in the run, by short irregularities, changing sections or radii.
     """
@@ -270,10 +270,9 @@ class Stability:
             if not self.holds_on_straight(h, margin):
                 return False
             self._flange = self._curving(min(h, self.longest))
-        margins = margin, math.sqrt(margin)
         return all(
-            self._within(number, *at, h, factor)
-            for number, (at, factor) in enumerate(zip(self._flange, margins, strict=False), 1)
+            self._within(number, *at, h, margin if number == 1 else math.sqrt(margin))
+            for number, at in enumerate(self._flange, 1)
         ) and (first or self.holds_on_straight(h, margin))
 
     def _within(

@@ -86,12 +86,13 @@ def in_flange_contact(
 
 
 def at_rest_beside(
-    model: Model, at: tuple[System, Floats], speed: float, less: float
+    model: Model, at: tuple[System, Floats], speed: float, less: float | Floats
 ) -> tuple[System, Floats]:
     """System and state of rest at another speed and with less friction, by Newton's method.
 
     `at`: system and vehicle at rest on a curve; `speed`: [m/s]; `less`: taken from the coefficients
-    of friction.  Raises NotConverged: there is no state of rest near the known one.
+    of friction, of both rails or float64[2].  Raises NotConverged: there is no state of rest near
+    the known one.
     """
     system, state = at
     rail = system.track.rail.copy()

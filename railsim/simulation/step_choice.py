@@ -58,7 +58,7 @@ class StepChoice:
     Creep forces stiffen as 1/V, and friction feeds vibrations: a class is judged at its lowest
     speed and highest friction.  In flange contact growth often rises with the speed and is largest
     at some friction in between: there a class is judged at its highest speed and middle friction
-    as well, with half of the margin.
+    as well, with half of the margin; so is less friction elsewhere along the track.
 
     `states`: steady rolling on straight track at the speeds where it is known; `inputs`: hash of
     all that the model was made of, friction apart, see `inputs_hash`; `on_straight`: of what counts
@@ -223,11 +223,14 @@ class StepChoice:
             at = in_flange_contact(model, self._track, rolling, step, self._progress)
             if at is None:
                 return []
-            found = [at]
+            less = less_friction(self._track)
+            others = [(speed, part) for part in less[1:]]
             if of_class:
-                with suppress(NotConverged):  # then the first decides alone
-                    other = CLASS * speed, 0.5 * FRICTION_CLASS
-                    found.append(at_rest_beside(model, at, *other))
+                others += [(CLASS * speed, 0.5 * FRICTION_CLASS + part) for part in less]
+            found = [at]
+            for other in others:
+                with suppress(NotConverged):  # then the others decide alone
+                    found.append(at_rest_beside(model, (at[0], found[-1][1]), *other))
             return found
 
         digest = hashlib.sha256(f"{self._on_straight} {speed!r}".encode() + rolling.tobytes())
@@ -276,6 +279,17 @@ def with_class_friction(model: Model, *, least: bool = False) -> Model:
     number = np.maximum(np.ceil(friction / FRICTION_CLASS - 1e-9) - float(least), 0.0)
     rail[:, MU_LEFT : MU_RIGHT + 1, 0] = FRICTION_CLASS * number
     return replace(model, system=model.system._replace(track=track._replace(rail=rail)))
+
+
+def less_friction(track: Track) -> Floats:
+    """By how much friction along a track is less than the largest of each rail.
+
+    float64[part, 2], left and right, in steps of a class, rising; the first part is zero.
+    """
+    rows = track.friction_table or ((0.0, *track.friction),)
+    classes = np.ceil(np.array(rows)[:, 1:] / FRICTION_CLASS - 1e-9)
+    less = FRICTION_CLASS * (classes.max(axis=0) - classes)
+    return np.unique(np.vstack([np.zeros(2), less]), axis=0)
 
 
 def braked_step(system: System) -> float:

@@ -229,3 +229,12 @@ def test_steps_are_judged_on_a_line_with_the_largest_friction_of_each_rail():
     assert ends[1] > np.max(system.frame_offset) + 50.0
     assert not level.track.has_irregularity
     assert len(level.loads.body) == len(level.drives.body) == 0
+
+
+def test_less_friction_along_the_track_is_judged_in_steps_of_a_class():
+    """The largest is that of each rail: 0.45 and 0.4, which are of the classes 0.5 and 0.4."""
+    track = load_track("curve_r250")
+    assert step_choice.less_friction(track).tolist() == [[0.0, 0.0]]
+    rows = [[0.0, 0.45, 0.25], [10.0, 0.42, 0.22], [20.0, 0.15, 0.4], [30.0, 0.15, 0.4]]
+    found = step_choice.less_friction(track.replace(friction_table=rows))
+    assert found == pytest.approx(np.array([[0.0, 0.0], [0.0, 0.1], [0.3, 0.0]]))
