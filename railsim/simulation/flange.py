@@ -25,6 +25,7 @@ from railsim.kernels.time_loop import FAST
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
 from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
+from railsim.model.check_rails import standing_at
 from railsim.model.equilibrium import tracks_under
 from railsim.model.work import CONSTANT_SPEED, uneven_rigid_rails, without_loads
 from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
@@ -100,6 +101,16 @@ def at_rest_beside(
     np.maximum(friction - less, 0.0, out=friction)
     system = system._replace(track=system.track._replace(rail=rail))
     return system, SteadyRolling(model, system).solve(state, speed)
+
+
+def guided(model: Model, track: Track, system: System) -> list[System]:
+    """Return a system with the check rails where each of the track's is nearest to its rail."""
+    found = []
+    for rail in track.check_rail:
+        s, _ = min(rail.flangeway, key=lambda row: row[1])
+        check = standing_at(model.check, s)
+        found.append(system._replace(contact=system.contact._replace(**check._asdict())))
+    return found
 
 
 def _brought(

@@ -37,7 +37,7 @@ from railsim.model.solutions import solution
 from railsim.model.time_step import Situation, Stability
 from railsim.model.work import level_track_with_friction, uneven_rigid_rails
 from railsim.simulation.auxiliary_track import Progress
-from railsim.simulation.flange import at_rest_beside, in_flange_contact
+from railsim.simulation.flange import at_rest_beside, guided, in_flange_contact
 from railsim.track.irregularity import shortest_wave
 
 CLASS = 1.2  # ratio of the speeds of a class
@@ -224,13 +224,18 @@ class StepChoice:
             if at is None:
                 return []
             less = less_friction(self._track)
-            others = [(speed, part) for part in less[1:]]
+            others = [(at[0], speed, part) for part in less[1:]]
             if of_class:
-                others += [(CLASS * speed, 0.5 * FRICTION_CLASS + part) for part in less]
+                others += [(at[0], CLASS * speed, 0.5 * FRICTION_CLASS + part) for part in less]
+            for system in guided(model, self._track, at[0]):
+                others += [(system, speed, less[0])]
+                if of_class:
+                    others += [(system, CLASS * speed, 0.5 * FRICTION_CLASS + less[0])]
             found = [at]
-            for other in others:
+            for system, *other in others:
+                near = found[-1][1] if system is at[0] else at[1]
                 with suppress(NotConverged):  # then the others decide alone
-                    found.append(at_rest_beside(model, (at[0], found[-1][1]), *other))
+                    found.append(at_rest_beside(model, (system, near), *other))
             return found
 
         digest = hashlib.sha256(f"{self._on_straight} {speed!r}".encode() + rolling.tobytes())

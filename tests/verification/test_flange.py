@@ -283,3 +283,19 @@ def test_step_is_stable_where_the_rails_of_a_curve_are_less_rough_than_those_bef
     result = railsim.simulate(coach, falling, speed=15.0, start=385.0, until=395.0)
     for forces in (result.Y, result.Q):
         assert np.max(np.std(np.diff(forces, axis=0), axis=0)) < 1e-4 * result.Q0.mean()
+
+
+def test_step_is_stable_where_a_check_rail_guides_in_the_curve():
+    """Smooth rails: forces change by less than 1e-4 of the load from output to output.
+
+    A step of 1.67 ms, stable without the check rail, made Y change by 1.5 %.
+    """
+    way = [[250.0, 0.065], [260.0, 0.04], [450.0, 0.04], [460.0, 0.065]]
+    rail = {"rail": "right", "friction": 0.4, "flangeway": way}
+    track = railsim.load_track("curve_r250").replace(
+        support={"preset": "rigid"}, friction=0.4, check_rail=[rail]
+    )
+    coach = load_vehicle("coach_manchester")
+    result = railsim.simulate(coach, track, speed=15.0, start=385.0, until=395.0)
+    for forces in (result.Y, result.Q):
+        assert np.max(np.std(np.diff(forces, axis=0), axis=0)) < 1e-4 * result.Q0.mean()
