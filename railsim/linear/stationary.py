@@ -77,9 +77,14 @@ class TwistLoop:
         return np.asarray((self.Q0 - self.Q) / self.Q0)
 
     @property
+    def smallest(self) -> Floats:
+        """Smallest loads in the closed loop, without the way to it, float64[wheelset, side] [N]."""
+        return np.asarray(self.Q[-4 * PARTS :].min(axis=0))
+
+    @property
     def worst(self) -> tuple[int, int]:
-        """Wheelset and side of the wheel that is unloaded most."""
-        wheelset, side = first_largest(self.unloading.max(axis=0))
+        """Wheelset and side of the wheel that the closed loop unloads most."""
+        wheelset, side = first_largest(1.0 - self.smallest / self.Q0)
         return wheelset, side
 
     @property

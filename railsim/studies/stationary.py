@@ -192,7 +192,7 @@ def stationary(
             loops[name] = loop
         values += _unloading(name, loop, limits.unloading, has_pads(balance.model))
     whole = len(loops) == len(twists)
-    load = min(float(loop.Q[:, 0].min()) for loop in loops.values()) if whole else np.nan
+    load = min(float(loop.smallest[0].min()) for loop in loops.values()) if whole else np.nan
     curve = f"R {limits.guiding.radius:g} m"
     forces, quotients = [], []
     for hand, bend in (("right", 1.0), ("left", -1.0)):
@@ -269,7 +269,7 @@ def _unloading(
     else:
         wheelset, side = loop.worst
         wheel = f"wheelset {wheelset + 1} {SIDES[side]}"
-        worst, left = float(np.max(loop.unloading)), loop.on_level
+        worst, left = float(np.max(1.0 - loop.smallest / loop.Q0)), loop.on_level
     values = [_judged(case, UNLOADING, worst, limit, wheel)]
     for name, value in zip(level, left, strict=True) if friction else ():
         values.append(StationaryValue(case, name, value, None, wheel))

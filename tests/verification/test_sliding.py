@@ -1,5 +1,7 @@
 """Twist of vehicles with dry friction from both directions: closed forms, symmetry, slow runs."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from dynamics import Settings, load_track, load_vehicle, steady
@@ -7,7 +9,7 @@ from rig import test_vehicle
 
 import railsim
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.linear.stationary import WALKING_PACE, on_twist, twist_loop
+from railsim.linear.stationary import WALKING_PACE, TwistLoop, on_twist, twist_loop
 
 STIFFNESS, STICKING, SLIDING = 1e6, 3e6, 2e3  # N/m, N/m, N
 BASE = 1.0  # m, of the springs from the middle
@@ -83,6 +85,16 @@ def test_loop_of_a_wagon_is_its_own_mirror_image():
     np.testing.assert_allclose(loop.Q.sum(axis=(1, 2)), balance.Q0.sum(), rtol=1e-5)
     # friction adds to the unloading, and stands at level track: more than the 3 % of its half
     assert loop.on_level[0] > 0.03 > 0.0 > loop.on_level[1]
+
+
+def test_first_way_to_the_twist_is_no_part_of_the_loop():
+    """Friction that has not been through the loop may unload more there, to one side only."""
+    share = np.concatenate([np.linspace(a, b, 9)[1:] for a, b in pairwise([0, 1, 0, -1, 0, 1])])
+    Q0 = np.full((2, 2), 1e5)
+    Q = Q0 - 2e4 * share[:, None, None] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    Q[7] -= 1e3
+    loop = TwistLoop(share, Q, Q0)
+    assert loop.smallest == pytest.approx(np.full((2, 2), 8e4))
 
 
 def test_one_way_to_the_twist_is_the_first_branch_of_the_loop():
