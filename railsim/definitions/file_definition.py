@@ -62,6 +62,10 @@ class FileDefinition(Definition):
         """Return what is wrong between the parts of a valid definition; the file is empty."""
         return []
 
+    def settled(self) -> Self:
+        """Return the valid definition with what its keys ask to be done with it."""
+        return self
+
     def unusual(self) -> list[Remark]:
         """Return what is allowed but unusual."""
         return []
@@ -193,7 +197,7 @@ def validated(model: type[D], source: Source) -> D:
         faults = faults or located(definition.contradictions())
     if faults:
         raise InputError(dict.fromkeys(faults))
-    return definition
+    return definition.settled()
 
 
 def format_fault(file: str, found: object, allowed: Iterable[str]) -> Fault:

@@ -1,7 +1,8 @@
-"""The mirror images of vehicles and tracks: left and right exchanged.
+"""The mirror images of vehicles and tracks, left and right exchanged, and the vehicle turned round.
 
 A right-hand curve becomes the left-hand one, a lopsided load changes sides.  Mirrored vehicle on
-mirrored track gives the mirrored result, which checks all signs.
+mirrored track gives the mirrored result, which checks all signs.  A vehicle turned end for end is
+reflected across and fore and aft.
 """
 
 from collections.abc import Set
@@ -12,11 +13,14 @@ from railsim.definitions.elements.base import Element
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import groups
+from railsim.definitions.vehicle.loads import LoadGroup
 
-SIGNS = (1.0, -1.0, 1.0)
+ACROSS, ALONG = (1.0, -1.0, 1.0), (-1.0, 1.0, 1.0)  # signs of a reflection
 TABLES = ("bodies", "wheelsets", "axleboxes", "elements", "assemblies", "loads", "sensors")
+TURNED = ", turned"  # behind the name of a vehicle that has been turned
 
 Part = TypeVar("Part", bound=Definition)
+V = TypeVar("V", bound=Vehicle)
 Row = tuple[float, float, float]
 
 
@@ -46,10 +50,11 @@ def _sides_exchanged(rows: tuple[Row, ...] | None) -> tuple[Row, ...] | None:
     return None if rows is None else tuple((s, right, left) for s, left, right in rows)
 
 
-def mirrored_vehicle(vehicle: Vehicle) -> Vehicle:
+def mirrored_vehicle(vehicle: V) -> V:
     """Return the mirror image of a vehicle; parts on both sides keep their names.
 
-    Its load cases and sensors are mirrored too; signals and what controllers do with them are not.
+    Its load cases, sensors and points of service are mirrored too; signals and what controllers do
+    with them are not.
     """
     boxes = {
         name
@@ -57,20 +62,26 @@ def mirrored_vehicle(vehicle: Vehicle) -> Vehicle:
         for name, box in group.axleboxes.items()
         if box.sides == "both"
     }
-    return _mirrored(vehicle, boxes)
+    return _across(vehicle, boxes)
 
 
-def _mirrored(part: Part, boxes: Set[str]) -> Part:
+def turned_vehicle(vehicle: V) -> V:
+    """Return a vehicle turned end for end, with ``, turned`` behind its name.
+
+    Parts on both sides keep their names.  The angles of wheels that are not round stay the same.
+    """
+    whole = _along(mirrored_vehicle(vehicle))
+    name = vehicle.name.removesuffix(TURNED) if TURNED in vehicle.name else vehicle.name + TURNED
+    return whole.model_copy(update={"name": name, "turned": False})
+
+
+def _across(part: Part, boxes: Set[str]) -> Part:
     """Return a part of a vehicle, with all parts in it, on the other side."""
     if getattr(part, "sides", None) == "both":
         return part
     update: dict[str, Any] = {}
     for name, value in part:
         match name, value:
-            case ("position" | "point", tuple()):
-                update[name] = _across(value)
-            case ("points", tuple()):
-                update[name] = tuple(map(_across, value))
             case ("radius" | "profile", tuple()):
                 update[name] = value[::-1]
             case ("wheel", _):
@@ -78,18 +89,50 @@ def _mirrored(part: Part, boxes: Set[str]) -> Part:
             case ("bodies", tuple()):
                 update[name] = tuple(_opposite(body, boxes) for body in value)
             case ("placements", _):
-                update[name] = tuple(_mirrored(inner, boxes) for inner in value)
-            case (_, dict()) if name in (*TABLES, "out_of_round"):
-                update[name] = {key: _mirrored(inner, boxes) for key, inner in value.items()}
-    turned = part.mirrored(SIGNS) if isinstance(part, Element) else part
-    return turned.model_copy(update=update)
+                update[name] = tuple(_across(inner, boxes) for inner in value)
+            case ("service", Definition()):
+                update[name] = _across(value, boxes)
+            case (_, dict()) if name in (*TABLES, "out_of_round", "points"):
+                update[name] = {key: _across(inner, boxes) for key, inner in value.items()}
+    return _reflected(part, ACROSS).model_copy(update=update)
+
+
+def _along(part: Part) -> Part:
+    """Return a part of a vehicle reflected fore and aft, assemblies as a whole."""
+    update: dict[str, Any] = {}
+    for name, value in part:
+        match name, value:
+            case ("placements", _):
+                placed = (_reflected(one, ALONG) for one in value)
+                turned = [one.model_copy(update={"mirror": not one.mirror}) for one in placed]
+                return part.model_copy(update={name: tuple(turned)})
+            case ("service", Definition()):
+                update[name] = _along(value)
+            case (_, dict()) if name in (*TABLES, "points") and not isinstance(part, LoadGroup):
+                update[name] = {key: _along(inner) for key, inner in value.items()}
+            case ("bodies", dict()):  # of a load case; those of its assemblies turn with these
+                update[name] = {key: _reflected(inner, ALONG) for key, inner in value.items()}
+    return _reflected(part, ALONG).model_copy(update=update)
+
+
+def _reflected(part: Part, signs: Vector) -> Part:
+    """Return a part with its points and directions reflected, what is in it left alone."""
+
+    def at(point: Vector) -> Vector:
+        return (signs[0] * point[0], signs[1] * point[1], signs[2] * point[2])
+
+    update: dict[str, Any] = {}
+    for name, value in part:
+        match name, value:
+            case ("position" | "point", tuple()):
+                update[name] = at(value)
+            case ("points", tuple()):
+                update[name] = tuple(map(at, value))
+    directed = part.mirrored(signs) if isinstance(part, Element) else part
+    return directed.model_copy(update=update)
 
 
 def _opposite(body: str, boxes: Set[str]) -> str:
     """Return the name of the body on the other side of an axlebox on both sides."""
     box, _, side = body.rpartition(".")
     return f"{box}.{OTHER_SIDE[side]}" if box.rpartition(".")[2] in boxes else body
-
-
-def _across(point: Vector) -> Vector:
-    return (point[0], -point[1], point[2])

@@ -7,9 +7,9 @@ group that stands at each of its placements; its coordinates count from there.
 """
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
-from railsim.definitions.base import EMPTY_TABLE, Name, Text
+from railsim.definitions.base import EMPTY_TABLE, Flag, Name, Text
 from railsim.definitions.elements import AnyElement
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.section_files import embed_wheel_sections
@@ -37,6 +37,9 @@ class Vehicle(FileDefinition, Plottable):
     """Load case in force; `design`, the default: the numbers of the bodies themselves"""
     loads: dict[Name, LoadCase] = EMPTY_TABLE
     """Load cases by name"""
+    turned: Flag = False
+    """Turned end for end when it is read, so that its other end is ahead; the keys of the file and
+    assignments count as if it were not"""
     reference: Text | None = None
     """Full name of the body whose travelled distance is the vehicle's `distance`; by default the
     first body, else the first wheelset"""
@@ -84,7 +87,16 @@ class Vehicle(FileDefinition, Plottable):
 
     def contradictions(self) -> list[Fault]:
         """Return which parts stand where they cannot."""
+        if self.turned and (self.signals or self.controllers):
+            found = "the vehicle has signals or controllers"
+            return [Fault("", "turned", found, "none: their signs cannot be turned")]
         return position_faults(self)
+
+    def settled(self) -> Self:
+        """Return the vehicle as it stands on the track."""
+        from railsim.definitions.mirror import turned_vehicle
+
+        return turned_vehicle(self) if self.turned else self
 
     def _table(self) -> Table:
         """Return the table of bodies that a notebook shows."""
