@@ -68,9 +68,9 @@ def mirrored_vehicle(vehicle: V) -> V:
 def turned_vehicle(vehicle: V) -> V:
     """Return a vehicle turned end for end, with ``, turned`` behind its name.
 
-    Parts on both sides keep their names.  The angles of wheels that are not round stay the same.
+    Parts on both sides keep their names; its wheels roll the other way.
     """
-    whole = _along(mirrored_vehicle(vehicle))
+    whole = _along(_rolling_back(mirrored_vehicle(vehicle)))
     name = vehicle.name.removesuffix(TURNED) if TURNED in vehicle.name else vehicle.name + TURNED
     return whole.model_copy(update={"name": name, "turned": False})
 
@@ -95,6 +95,19 @@ def _across(part: Part, boxes: Set[str]) -> Part:
             case (_, dict()) if name in (*TABLES, "out_of_round", "points"):
                 update[name] = {key: _across(inner, boxes) for key, inner in value.items()}
     return _reflected(part, ACROSS).model_copy(update=update)
+
+
+def _rolling_back(group: Part) -> Part:
+    """Return a vehicle or an assembly whose wheels roll the other way."""
+    given: Any = group
+    wheelsets = {
+        name: wheelset.model_copy(
+            update={"out_of_round": {k: v.backwards() for k, v in wheelset.out_of_round.items()}}
+        )
+        for name, wheelset in given.wheelsets.items()
+    }
+    assemblies = {name: _rolling_back(inner) for name, inner in given.assemblies.items()}
+    return group.model_copy(update={"wheelsets": wheelsets, "assemblies": assemblies})
 
 
 def _along(part: Part) -> Part:

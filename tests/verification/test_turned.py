@@ -5,6 +5,7 @@ import pytest
 from test_vehicles import lopsided_everything
 
 from railsim import InputError, load_track, load_vehicle, simulate
+from railsim.contact.out_of_round import _height, _wrapped
 from railsim.definitions.mirror import turned_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
@@ -92,6 +93,33 @@ def test_turned_twice_a_vehicle_is_itself(name):
     assert [b.position[0] for b in flatten(turned).of_kind("wheelset")] == pytest.approx(
         [-x for x in ends[::-1]]
     )
+
+
+@pytest.mark.parametrize(
+    "uneven",
+    [
+        {"type": "harmonics", "angle": 0.4, "waves": [[1, 2e-4, 0.3], [3, 1e-4, -1.1]]},
+        {"type": "table", "angle": 0.4, "rows": [[0.0, 0.0], [0.5, 3e-4], [2.0, -1e-4]]},
+        {"type": "flat", "angle": 0.4, "length": 0.05, "shape": "worn"},
+    ],
+)
+def test_a_wheel_that_rolls_the_other_way_has_its_radius_of_the_opposite_angle(uneven):
+    uneven = uneven | {"wheel": "left"}
+    coach = load_vehicle("coach_manchester")
+    axle = coach.model_dump(exclude_none=True)
+    axle["assemblies"]["bogie"]["assemblies"]["axle"]["wheelsets"]["wheelset"]["out_of_round"] = {
+        "it": uneven
+    }
+    turned = turned_vehicle(Vehicle.model_validate(axle))
+    (part,) = flatten(turned).of_kind("wheelset")[0].wheelset.out_of_round.values()
+    assert part.wheel == "right"
+    before = type(part).model_validate(uneven)
+    phi = np.linspace(0.0, 2.0 * np.pi, 50)
+    found, expected = (
+        _height(one, 0.45, _wrapped(at - one.angle))[0] for one, at in ((part, phi), (before, -phi))
+    )
+    assert np.ptp(expected) > 1e-5
+    assert found == pytest.approx(expected, abs=1e-12)
 
 
 def test_sensors_and_points_of_service_stay_where_they_are_on_the_vehicle(tmp_path):

@@ -6,7 +6,7 @@ file at the angle phi touches the rail at the pitch -phi.
 """
 
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
@@ -26,6 +26,10 @@ class Uneven(Definition):
     angle: Angle = 0.0
     """Angle of the wheel from which its own angles count [rad]"""
 
+    def backwards(self, **values: object) -> Self:
+        """Return it on a wheel that rolls the other way: every angle has the other sign."""
+        return self.model_copy(update={"angle": -self.angle, **values})
+
 
 class Harmonics(Uneven):
     """Waves around the wheel: r(phi) = r0 + sum of amplitude cos(order phi + phase)."""
@@ -36,6 +40,11 @@ class Harmonics(Uneven):
         Field(min_length=1, max_length=MOST_WAVES),
     ]
     """Rows of order, amplitude [m] and phase [rad]"""
+
+    def backwards(self, **values: object) -> Self:
+        """Return the waves with their phases on a wheel that rolls the other way."""
+        waves = tuple((order, amplitude, -phase) for order, amplitude, phase in self.waves)
+        return super().backwards(waves=waves, **values)
 
     @check
     def _whole_orders(self) -> None:
@@ -52,6 +61,11 @@ class RadiusTable(Uneven):
         tuple[tuple[Angle, Change], ...], Field(min_length=3, max_length=MOST_ROWS), rises("angle")
     ]
     """Rows [angle, change of the radius], over less than one turn [rad, m]"""
+
+    def backwards(self, **values: object) -> Self:
+        """Return the table in the order in which a wheel that rolls the other way comes to it."""
+        rows = tuple((-angle, change) for angle, change in self.rows[::-1])
+        return super().backwards(rows=rows, **values)
 
     @check
     def _one_turn(self) -> None:
@@ -83,6 +97,15 @@ class Sections(Uneven):
     """Lateral positions from the nominal rolling circle, positive to the field side [m]"""
     heights: tuple[tuple[Finite, ...], ...] | None = None
     """Of every section the radius at the positions, less the nominal one [m]"""
+
+    def backwards(self, **values: object) -> Self:
+        """Return the sections in the order in which a wheel that rolls the other way has them."""
+        if self.angles is not None and self.heights is not None:
+            values |= {
+                "angles": tuple(-a for a in self.angles[::-1]),
+                "heights": self.heights[::-1],
+            }
+        return super().backwards(**values)
 
     @check
     def _one_source(self) -> None:
