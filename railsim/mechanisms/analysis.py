@@ -197,19 +197,13 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
     at_zone = zone_drivers(dense)
     in_zone = outputs(solve(model, list(at_zone.values()))) if at_zone else {}
     zone = {n: {k: float(v[i]) for k, v in in_zone.items()} for i, n in enumerate(at_zone)}
+    rates = Rates(friction=model.sense)
     timed = driven_motion(dense) if definition.motion is not None else None
-    forces = _force_zeros(dense), positions_of_rest(dense), _reactions(motion, dense)
+    forced = definition.solve is not None and np.any(generalised_force(dense, rates))
+    turned = zeros(dense, lambda m: generalised_force(m, rates)) if forced else ()
+    forces = tuple(turned), positions_of_rest(dense), _reactions(motion, dense)
     found = *forces, transitions(dense), contact_of(dense, motion, at_zone), timed, _release(model)
     return Analysis(definition, model, motion, output, zone, *found, case)
-
-
-def _force_zeros(dense: Motion) -> tuple[float, ...]:
-    if dense.model.definition.solve is None:
-        return ()
-    rates = Rates(friction=dense.model.sense)
-    if not np.any(generalised_force(dense, rates)):
-        return ()
-    return tuple(zeros(dense, lambda m: generalised_force(m, rates)))
 
 
 def _reactions(motion: Motion, dense: Motion) -> dict[str, Reaction]:

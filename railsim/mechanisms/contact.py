@@ -1,6 +1,6 @@
 """Positions of rest, and the static contact force of the output at a held pressure."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -74,7 +74,7 @@ def rests(dense: Motion, force: Force) -> tuple[Rest, ...]:
     if not np.any(force(dense, 0)):
         return ()
     if forces.rubs(model):
-        return _rest_ranges(dense, force)
+        return tuple(_rest_ranges(dense, force))
     span = model.end - model.start
     low, high = sorted((model.start, model.end))
     found = []
@@ -85,21 +85,19 @@ def rests(dense: Motion, force: Force) -> tuple[Rest, ...]:
     return tuple(found)
 
 
-def _rest_ranges(dense: Motion, force: Force) -> tuple[Rest, ...]:
+def _rest_ranges(dense: Motion, force: Force) -> Iterator[Rest]:
     model = dense.model
     edges = [(float(s), 0) for s in (model.start, model.end)]
     for sense in (1, -1):
         edges += [(s, sense) for s in zeros(dense, lambda m, k=sense: force(m, k))]  # type: ignore[misc]
     edges.sort()
-    found: list[Rest] = []
     for (low, kind), (high, other) in pairwise(edges):
         if high - low < 1e-12 * abs(model.end - model.start):
             continue
         middle = solve(model, [0.5 * (low + high)])
         if force(middle, 1)[0] <= 0.0 <= force(middle, -1)[0]:
             # not stable where it is moved away: back from below the range, on from above it
-            found.append(Rest(0.5 * (low + high), low, high, kind != -1 and other != 1))
-    return tuple(found)
+            yield Rest(0.5 * (low + high), low, high, kind != -1 and other != 1)
 
 
 def _held(dense: Motion, work: float) -> tuple[float, float]:

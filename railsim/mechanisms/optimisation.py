@@ -125,32 +125,22 @@ def _assembles(judge: Judge, x: Floats, choice: dict[str, float]) -> bool:
 
 
 def _search(judge: Judge, begins: Sequence[Any], workers: int) -> list[Start]:
-    """All starts, the most promising ones to the end; over processes where there are many."""
+    """All starts, the most promising ones and the file's own to the end; over processes if many."""
     rough = Judge(judge.definition, EVERY)
     jobs = [(index, *begin) for index, begin in enumerate(begins)]
     each: Any = map
     with ExitStack() as stack:
         if workers > 1 and len(jobs) >= 4:
             each = stack.enter_context(WorkerPool(workers)).map
-        found = list(each(partial(_run, rough, SEARCH), jobs))
-        finals = list(each(partial(_run, judge, FINISH), _finals(judge, found)))
-    return _finished(judge, found, finals)
-
-
-def _finals(judge: Judge, starts: Sequence[Start]) -> list[Any]:
-    """The most promising starts, and the file's own, from where they have come to."""
-    usable = [start for start in starts if np.isfinite(start.objective)]
-    ranked = sorted(usable, key=lambda start: (max(start.violation, FEASIBLE), start.objective))
-    written = [start for start in ranked[FINALISTS:] if start.number == 0]
-    finalists = [*ranked[:FINALISTS], *written]
-    return [(start.number, *judge.point_of(start.end)) for start in finalists]
-
-
-def _finished(judge: Judge, starts: Sequence[Start], finals: Sequence[Start]) -> list[Start]:
-    """All starts judged at all positions."""
-    ends = {start.number: start for start in finals}
+        rough_ends = list(each(partial(_run, rough, SEARCH), jobs))
+        usable = [start for start in rough_ends if np.isfinite(start.objective)]
+        ranked = sorted(usable, key=lambda start: (max(start.violation, FEASIBLE), start.objective))
+        written = [start for start in ranked[FINALISTS:] if start.number == 0]
+        finalists = [*ranked[:FINALISTS], *written]
+        jobs = [(start.number, *judge.point_of(start.end)) for start in finalists]
+        ends = {start.number: start for start in each(partial(_run, judge, FINISH), jobs)}
     found = []
-    for start in starts:
+    for start in rough_ends:  # judged at all positions
         if (end := ends.get(start.number)) is not None:
             count = start.evaluations + end.evaluations
             start = replace(end, begin=start.begin, evaluations=count)

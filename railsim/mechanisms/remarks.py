@@ -1,5 +1,7 @@
 """What is allowed but unusual in the results of a mechanism: rules of thumb, narrow margins."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from railsim.definitions.mechanism import parts
@@ -18,36 +20,33 @@ NEAR = 0.05
 
 def remarks(result: Analysis) -> list[str]:
     """Remarks of the file, and on what its results are."""
-    own = [*_zone(result), *_forces(result), *_rods(result), *_gas_springs(result), *_lid(result)]
-    own += _torsion_springs(result)
+    kinds = _zone, _forces, _rods, _gas_springs, _lid, _torsion_springs
+    own = [remark for kind in kinds for remark in kind(result)]
     bounds = [f"{r.key}: {r.text}" for r in bounds_remarks(result.definition)]
     return [*result.definition.remarks, *own, *bounds]
 
 
-def _zone(result: Analysis) -> list[str]:
+def _zone(result: Analysis) -> Iterator[str]:
     """Heights that the output reaches more than once."""
     along = "x" if result.model.axis == 0 else "height"
-    found = []
     for name, values in result.zone.items():
         if np.count_nonzero(np.diff(result.output[along] > values[along])) > 1:
             at = driver_words(result.model, values["travel"])
-            found.append(f"the output reaches zone.{name} again; results are those at {at}")
-    return found
+            yield f"the output reaches zone.{name} again; results are those at {at}"
 
 
-def _forces(result: Analysis) -> list[str]:
+def _forces(result: Analysis) -> Iterator[str]:
     """A hand that has to hold back."""
     definition = result.definition
-    if definition.solve is None:
-        return []
-    least = runs_ahead(result)
-    if not isinstance(definition.held_by, parts.HandForce | parts.HandTorque) or least >= 0.0:
-        return []
-    hand, unit = definition.unknown, force_unit(definition.unknown, definition)
-    return [f"'{hand}' holds back with up to {-least:.2f} {unit}: the load runs ahead"]
+    hands = parts.HandForce | parts.HandTorque
+    if definition.solve is not None and isinstance(definition.held_by, hands):
+        hand, least = definition.unknown, runs_ahead(result)
+        if least < 0.0:
+            held = f"{-least:.2f} {force_unit(hand, definition)}"
+            yield f"'{hand}' holds back with up to {held}: the load runs ahead"
 
 
-def _rods(result: Analysis) -> list[str]:
+def _rods(result: Analysis) -> Iterator[str]:
     """A rod hardly longer than its crank: close to a dead point when they lie on each other."""
     model, joints = result.model, result.definition.joints
     pairs = [joint.revolute for joint in joints.values() if isinstance(joint, parts.Revolute)]
@@ -55,7 +54,6 @@ def _rods(result: Analysis) -> list[str]:
     pivots = {body_name(p): p for pair in fixed for p in pair if body_name(p) != "ground"}
     guides = [joint.prismatic for joint in joints.values() if isinstance(joint, parts.Prismatic)]
     slides = {body_name(point) for pair in guides for point in pair}
-    found = []
     for name, joint in joints.items():
         if not isinstance(joint, parts.Link):
             continue
@@ -67,15 +65,13 @@ def _rods(result: Analysis) -> list[str]:
             crank, rod = float(np.hypot(*d[0])), float(model.number(joint.length))
             if abs(rod - crank) < NEAR * crank:
                 longer = f"{abs(rod - crank) * 1e3:.3f} mm {'longer' if rod > crank else 'shorter'}"
-                found.append(
+                yield (
                     f"rod '{name}' is only {longer} than its crank of {crank * 1e3:.3f} mm: close "
                     "to a dead point, sensitive to every tolerance"
                 )
-    return found
 
 
-def _gas_springs(result: Analysis) -> list[str]:
-    found = []
+def _gas_springs(result: Analysis) -> Iterator[str]:
     low, high = GAS_PRESSURES
     for name, part in result.definition.elements.items():
         if not isinstance(part, parts.GasSpring):
@@ -83,34 +79,32 @@ def _gas_springs(result: Analysis) -> list[str]:
         if f"{name}_pressure" in result.output:
             pressure = result.extremes(f"{name}_pressure")
             if pressure.least < low or pressure.most > high:
-                found.append(
+                yield (
                     f"gas pressure of '{name}' {pressure.least / 1e5:.1f} to "
                     f"{pressure.most / 1e5:.1f} bar, usual {low / 1e5:g} to {high / 1e5:g} bar"
                 )
         if part.rod_end is None and (drop := rod_drop(result, name)):
             lower = part.gas_spring[0] if drop > 0.0 else part.gas_spring[1]
-            found.append(f"'{name}' belongs with its rod at {lower}, the lower end when compressed")
-    return found
+            yield f"'{name}' belongs with its rod at {lower}, the lower end when compressed"
 
 
-def _torsion_springs(result: Analysis) -> list[str]:
+def _torsion_springs(result: Analysis) -> Iterator[str]:
     """Torsion springs wound by more than half a turn, maybe by a turn too many in [start]."""
-    found, motion = [], result.motion
+    motion = result.motion
     for name, part in result.definition.elements.items():
         if isinstance(part, parts.TorsionSpring) and part.free_angle is not None:
             first, second = (motion.q[:, result.model.bodies[b], 2] for b in part.torsion_spring)
             most = float(np.max(np.abs(first - second - result.model.number(part.free_angle))))
             if most > np.pi:
                 turned = f"torsion spring '{name}' is wound by up to {np.degrees(most):.1f} deg"
-                found.append(f"{turned}: angles are counted from those in [start] and [driver]")
-    return found
+                yield f"{turned}: angles are counted from those in [start] and [driver]"
 
 
-def _lid(result: Analysis) -> list[str]:
+def _lid(result: Analysis) -> Iterator[str]:
     """The makers' rule of thumb for lids."""
-    return [
-        f"makers' rule of thumb for lids, G D/(b n) 9.8 alpha: F1 of "
-        f"'{check.name.removeprefix('lid_')}' {check.limit:.1f} N; here {check.value:.1f} N"
-        for check in checks(result)
-        if check.sense == "about"
-    ]
+    for check in checks(result):
+        if check.sense == "about":
+            yield (
+                f"makers' rule of thumb for lids, G D/(b n) 9.8 alpha: F1 of "
+                f"'{check.name.removeprefix('lid_')}' {check.limit:.1f} N; here {check.value:.1f} N"
+            )

@@ -1,5 +1,6 @@
 """Choice of components: every row of a catalogue fits, or why not, and what it does."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -32,11 +33,9 @@ class Choice:
 
 def selection(result: Analysis) -> list[Choice]:
     """Cylinders and gas springs of the catalogues, each with its verdict."""
-    found: list[Choice] = []
     definition = result.definition
-    if definition.solve is not None:
-        unknown = definition.held_by
-        found += _cylinders(result, unknown) if isinstance(unknown, Cylinder) else []
+    unknown = definition.held_by if definition.solve is not None else None
+    found = [*_cylinders(result, unknown)] if isinstance(unknown, Cylinder) else []
     for wanted in definition.selection:
         element = definition.elements[wanted.element]
         assert isinstance(element, GasSpring)
@@ -58,14 +57,13 @@ def needed_bore(result: Analysis, cylinder: Cylinder) -> float:
     return max(bores)
 
 
-def _cylinders(result: Analysis, cylinder: Cylinder) -> list[Choice]:
+def _cylinders(result: Analysis, cylinder: Cylinder) -> Iterator[Choice]:
     n = result.model.number
     bore, stroke = needed_bore(result, cylinder), result.stroke
     shortest = result.extremes("length").least
     made = next_size([n(s) for s in cylinder.strokes], stroke)
     least, _ = either_way(result, "force")
     wrong = cylinder.acts != "both" and -least > ROUNDING * result.peak_force
-    found = []
     for size in (n(b) for b in cylinder.bores):
         why = []
         if wrong:
@@ -82,8 +80,7 @@ def _cylinders(result: Analysis, cylinder: Cylinder) -> list[Choice]:
                 why.append(f"{shortest * 1e3:.1f} mm at the shortest, {apart}")
         words = (f"stroke {made * 1e3:g} mm",) if made is not None else ()
         name = f"bore {size * 1e3:g} mm"
-        found.append(Choice("cylinder", name, not why, tuple(why) or words, {}))
-    return found
+        yield Choice("cylinder", name, not why, tuple(why) or words, {})
 
 
 def _gas_spring(

@@ -12,7 +12,7 @@ import numpy as np
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import compare
-from railsim.mechanisms.contact import Contact, Rest
+from railsim.mechanisms.contact import Rest
 from railsim.mechanisms.dynamics import TimedMotion
 from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.remarks import remarks
@@ -62,8 +62,13 @@ def analysis_data(result: Analysis, *, courses: bool = True) -> Data:
         data["actuators"] = _courses(actuators(result.motion), "length")
     if result.timed is not None:
         data["motion"] = _motion_data(result, result.timed, courses=courses)
-    if result.contact is not None:
-        data["contact"] = _contact_data(result.contact)
+    if (contact := result.contact) is not None:
+        data["contact"] = {
+            "pressure": contact.pressure, "force": dict(contact.force),
+            "force_rising": dict(contact.rising), "force_falling": dict(contact.falling),
+            "curve": _list(contact.curve), "equilibria": _rests(contact.rests, "height"),
+            "reason": contact.reason or None,
+        }  # fmt: skip
     if (released := result.release) is not None:
         time, travel, speed = map(_list, (released.time, released.s, released.speed))
         data["release"] = {"time": time, "travel": travel, "speed": speed}
@@ -104,16 +109,6 @@ def published_data(result: Analysis) -> dict[str, Data]:
     computed: Data = {"travel": result.travel, **result.min_angles, **_extremes(result)}
     printed = {n: float(result.model.number(v)) for n, v in definition.published.items()}
     return {n: {"published": v, "ours": computed[n]} for n, v in printed.items() if n in computed}
-
-
-def _contact_data(contact: Contact) -> Data:
-    """The static contact force as plain numbers."""
-    return {
-        "pressure": contact.pressure, "force": dict(contact.force),
-        "force_rising": dict(contact.rising), "force_falling": dict(contact.falling),
-        "curve": _list(contact.curve), "equilibria": _rests(contact.rests, "height"),
-        "reason": contact.reason or None,
-    }  # fmt: skip
 
 
 def _rests(rests: Sequence[Rest], at: str) -> list[Data]:

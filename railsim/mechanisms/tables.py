@@ -301,7 +301,11 @@ def scatter_table(found: Sequence[Scatter]) -> Table:
     """Return one row for each result: its scatter and the parameter that matters most."""
     rows = []
     for one in found:
-        column = Column("", unit=shown_unit(one.unit), format=_decimals(one))
+        scaled = abs(one.worst) * Column("", unit=shown_unit(one.unit)).scale
+        before = int(np.floor(np.log10(scaled))) if scaled else 0
+        # four digits of the scatter, four decimals at most
+        decimals = min(max(3 - before, 0), 4)
+        column = Column("", unit=shown_unit(one.unit), format=f".{decimals}f")
         most = max(one.single, key=lambda name: abs(one.single[name]))
         values = [Amount(value, column) for value in (one.value, one.random, one.worst)]
         change = f"{one.single[most] * column.scale:+{column.format}}"
@@ -309,10 +313,3 @@ def scatter_table(found: Sequence[Scatter]) -> Table:
         rows.append([name, *values, f"{most} ({change})" if one.single[most] else "-"])
     numbers = [Column(name, format=">") for name in ("nominal", "RSS, ±", "worst case, ±")]
     return Table(["result", *numbers, "most by"], rows)
-
-
-def _decimals(one: Scatter) -> str:
-    """Return the format with four digits of the scatter, four decimals at most."""
-    shown = abs(one.worst) * Column("", unit=shown_unit(one.unit)).scale
-    before = int(np.floor(np.log10(shown))) if shown else 0
-    return f".{min(max(3 - before, 0), 4)}f"

@@ -18,6 +18,7 @@ from railsim.springs import arm as trailing_arm
 from railsim.springs import checks, helical
 from railsim.springs.arm import Arm, Coil, CoilState
 
+STEP = 1e-5  # rad
 TARE_MAX, TARE_MIN = 1.20, 0.65  # dynamic loads over the tare load: + 20 %, - 35 %
 
 
@@ -141,7 +142,9 @@ def load_cases(
         each = zip(suspension.springs, frame.coils, strict=True)
         states = {s: trailing_arm.coil_state(frame, coil, phi) for s, coil in each}
         deflection = float(states["outer"].deflection)
-        rate = _rate(frame, phi)
+        # slope by a central difference: its error about 1e-9, round-off about 1e-10 of the rate
+        low, high = trailing_arm.load(frame, np.array([phi - STEP, phi + STEP])).tolist()
+        rate = (high - low) / (2.0 * STEP * frame.length * float(np.cos(phi)))
         cases.append(Case(name, load, phi, deflection, load / deflection, rate, states))
     faults = Faults()
     for (name, found, remedy), *others in obstacles.values():
@@ -211,13 +214,6 @@ def stress(spring: HelicalSpring, state: CoilState) -> float:
     dimensions = (built(spring)[0], spring.mean_diameter)
     under = state.force, shear, state.height, state.lateral
     return float(checks.corrected_stress(*dimensions, *under))
-
-
-def _rate(frame: Arm, phi: float) -> float:
-    """Slope of the load over the rise of the axle, by a central difference [N/m]."""
-    step = 1e-5  # rad: error of the difference about 1e-9, round-off about 1e-10 of the rate
-    low, high = trailing_arm.load(frame, np.array([phi - step, phi + step])).tolist()
-    return float(high - low) / (2.0 * step * frame.length * float(np.cos(phi)))
 
 
 def _obstacle(

@@ -295,7 +295,7 @@ def test_what_is_said_of_a_gas_spring(monkeypatch, least, most, rod_end, drop, w
         output={} if least is None else {"flap_pressure": None},
         extremes=lambda name: SimpleNamespace(least=least, most=most),
     )
-    found = _gas_springs(result)
+    found = list(_gas_springs(result))
     assert len(found) == len(words)
     assert all("'flap'" in said and word in said for word, said in zip(words, found, strict=True))
 
@@ -330,7 +330,7 @@ def test_a_torsion_spring_is_remarked_from_half_a_turn_on(turned, sense):
         motion=SimpleNamespace(q=q),
         model=SimpleNamespace(bodies={"arm": 1, "rod": 2}, number=float),
     )
-    found = _torsion_springs(result)
+    found = list(_torsion_springs(result))
     assert len(found) == (turned > 180.0)
     assert all(f"'coil' is wound by up to {turned:.1f} deg" in said for said in found)
 
@@ -396,7 +396,7 @@ def test_a_hand_that_has_to_hold_back_is_remarked(monkeypatch, kind, least):
         held_by=kind.model_construct(),
         actuators={"grip": kind.model_construct()},
     )
-    found = held_back(SimpleNamespace(definition=definition))
+    found = list(held_back(SimpleNamespace(definition=definition)))
     unit = "N m" if kind is HandTorque else "N"
     said = f"'grip' holds back with up to {-least:.2f} {unit}: the load runs ahead"
     assert found == ([said] if kind is not Cylinder and least < 0.0 else [])
