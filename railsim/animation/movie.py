@@ -1,6 +1,7 @@
 """A scene as GIF (Pillow) or MP4 (ffmpeg): the vehicle, and its leading wheelset's contacts."""
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -73,8 +74,7 @@ def _axes(figure: Figure, scene: Scene) -> tuple[Axes, list[Axes]]:
 def draw(view: Axes, sections: list[Axes], scene: Scene, frame: int, gain: float = 1.0) -> None:
     """Draw one frame of a scene."""
     view.clear()
-    polygons = _polygons(scene, frame, gain)
-    polygons.sort(key=lambda item: -item[0])
+    polygons = sorted(_polygons(scene, frame, gain), key=lambda item: -item[0])
     _, points, faces, edges = zip(*polygons, strict=True)
     view.add_collection(PolyCollection(points, facecolors=faces, edgecolors=edges, linewidths=0.7))
     (left, top), (right, bottom) = _extent(scene)
@@ -99,16 +99,15 @@ def _extent(scene: Scene) -> tuple[Floats, Floats]:
     return seen.min(axis=0) - MARGIN, seen.max(axis=0) + MARGIN
 
 
-def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Floats, Any, Any]]:
+def _polygons(scene: Scene, frame: int, gain: float) -> Iterator[tuple[float, Floats, Any, Any]]:
     s0 = float(scene.distance[frame])
-    found: list[tuple[float, Floats, Any, Any]] = []
     at = _track(scene, s0)
     for side in (-0.75, 0.75):
         for s in np.arange(s0 - 22.0, s0 + 22.0, 2.0):
             ends = [_space(_track(scene, s + d), np.array([[0.0, side - w, 0.0]]))
                     for d, w in ((0.0, 0.04), (0.0, -0.04), (2.0, -0.04), (2.0, 0.04))]  # fmt: skip
             points, depth = _seen(np.concatenate(ends), at)
-            found.append((depth, points, "#8a8a8a", "#6b6b6b"))
+            yield depth, points, "#8a8a8a", "#6b6b6b"
     for k, body in enumerate(scene.bodies):
         q = scene.pose[frame, k]
         frame_at = _track(scene, s0 + body.offset + q[0])
@@ -120,8 +119,7 @@ def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Floats
                 [(gain - 1.0) * q[0], body.y + gain * q[1], body.z + gain * q[2]]
             )
             seen, depth = _seen(_space(frame_at, moved), at)
-            found.append((depth, seen, face, edge))
-    return found
+            yield depth, seen, face, edge
 
 
 def _shape(body: Drawn) -> list[Floats]:
@@ -149,12 +147,9 @@ def _rotated(a: Floats, b: Floats, angle: float) -> tuple[Floats, Floats]:
 def _space(at: Floats, points: Floats) -> Floats:
     """Points of the track frame in space."""
     x, y, heading, cant = at
-    ahead = points[:, 0]
     across, down = _rotated(points[:, 1], points[:, 2], cant)
-    return np.column_stack([
-        x + np.cos(heading) * ahead - np.sin(heading) * across,
-        y + np.sin(heading) * ahead + np.cos(heading) * across, down,
-    ])  # fmt: skip
+    east, south = _rotated(points[:, 0], across, heading)
+    return np.column_stack([x + east, y + south, down])
 
 
 def _turned(points: Floats, roll: float, pitch: float, yaw: float) -> Floats:

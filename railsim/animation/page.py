@@ -38,6 +38,7 @@ def write_page(
 def scene_data(scene: Scene) -> dict[str, Any]:
     """Return a scene as plain lists, rounded to what a screen shows (0.01 mm, 0.01 mrad)."""
     forces = patches = curves = None
+    named = [QUANTITIES[name] for name in ("Q", "Y", "wheelset_lateral")]
     if scene.Q is not None and scene.Y is not None:
         forces = {"Q": _list(scene.Q * 1e-3, 2), "Y": _list(scene.Y * 1e-3, 2)}
     if scene.curves is not None:
@@ -53,7 +54,7 @@ def scene_data(scene: Scene) -> dict[str, Any]:
              "box": list(b.box)}
             for b in scene.bodies
         ],
-        "words": {name: _words(name) for name in ("Q", "Y", "wheelset_lateral")},
+        "words": {q.name: f"{q.symbol} ({q.shown_unit}): {q.long_name}" for q in named},
         "time": _list(scene.time, 4), "distance": _list(scene.distance, 3),
         "pose": _list(scene.pose, 5),
         "track": {name: _list(values, 5) for name, values in scene.track.items()}, "forces": forces,
@@ -69,12 +70,6 @@ def _motion(scene: Scene) -> dict[str, Any]:
     times, poses = _list(scene.time, 5), _list(scene.pose, 4)
     name = scene.title.partition(" · ")[2]
     return {"title": scene.title, "name": name, "time": times, "pose": poses}
-
-
-def _words(name: str) -> str:
-    """A quantity as in printed tables: symbol, unit, words."""
-    quantity = QUANTITIES[name]
-    return f"{quantity.symbol} ({quantity.shown_unit}): {quantity.long_name}"
 
 
 def _list(values: Any, decimals: int) -> Any:

@@ -229,7 +229,11 @@ def patches_figure(
     figure = Picture(9.6, height, edges=edges)
     title = f"Contact patches of the right wheel under {1e-3 * load:.0f} kN{where}"
     figure.suptitle(title, x=0.06, y=1.0 - 0.1 / height, ha="left", va="top")
-    _explain_lines(figure, 1.0 - 0.3 / height, labels[: 2 if other else 1])
+    handles = [key(zone, color=colour) for zone, colour in ZONE_COLOURS.items()]
+    tables = zip(labels[: 2 if other else 1], TABLE_LINES, strict=False)
+    handles += [key(label, color="0.3", ls=line) for label, line in tables]
+    at = (0.05, 1.0 - 0.3 / height)
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=at, ncols=len(handles))
     axes = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
     positions = [patch.y for contact in contacts.values() for patch in contact.patches]
     low, high = 1e3 * min(positions) - 14.0, 1e3 * max(positions) + 14.0
@@ -251,14 +255,6 @@ def patches_figure(
         bar = figure.add_axes((0.92, 0.2, 0.012, 0.6))
         figure.colorbar(image, cax=bar, label="pressure by boundary elements (MPa)")
     return figure
-
-
-def _explain_lines(figure: Figure, top: float, labels: Sequence[str]) -> None:
-    """One row of a legend: the zones' colours, and the line of each table."""
-    handles = [key(zone, color=colour) for zone, colour in ZONE_COLOURS.items()]
-    tables = zip(labels, TABLE_LINES, strict=False)
-    handles += [key(label, color="0.3", ls=line) for label, line in tables]
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.05, top), ncols=len(handles))
 
 
 def _draw_ellipses(axes: Axes, contact: LoadedContact, line: str) -> None:

@@ -80,19 +80,14 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
         turned = 45.0 if number * len(columns) > 12 else 0.0
         axes.set_xticks(columns, [signed(r) for r in radius], fontsize=7.5, rotation=turned)
         axes.set_yticks(rows, [f"{value:g}" for value in deficiency])
-        if shown.size <= NUMBERS:
-            _numbers(axes, shown, largest)
+        for (r, i), value in np.ndenumerate(shown) if shown.size <= NUMBERS else ():
+            known = np.isfinite(value)
+            colour = "black" if value > 0.6 * largest or not known else "white"  # on light, on dark
+            words = signed(round(value)) if known else "none"
+            note(axes, words, (r, i), (0, 0), "center", "center", color=colour)
         axes.set(xlabel="radius (m)", ylabel="cant deficiency (mm)" if m == 0 else "")
         axes.set(title=rf"$T\gamma$ (N), leading outer wheel, friction {found.friction[m]:g}")
     figure.colorbar(picture, ax=figure.axes, label=r"$T\gamma$ (N)", fraction=0.03)
-
-
-def _numbers(axes: Axes, values: Floats, largest: float) -> None:
-    """Values in their fields, readable on dark and on light."""
-    for (r, i), value in np.ndenumerate(values):
-        words = signed(round(value)) if np.isfinite(value) else "none"
-        colour = "black" if value > 0.6 * largest or not np.isfinite(value) else "white"
-        note(axes, words, (r, i), (0, 0), "center", "center", color=colour)
 
 
 def _ticks(radius: Floats) -> list[float]:

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from railsim.arrays import Complexes
 from railsim.linear.modes import Mode, Modes, RootLocus
 from railsim.plot.style import DISTINCT, LIMIT, Picture, grid_of, say, styled
 
@@ -35,7 +34,10 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
     plane = figure.add_subplot(grid[1, 1])
     values = np.array(locus.values)
     eigenvalues = locus.eigenvalues
-    chosen = _drawn(eigenvalues)
+    with np.errstate(invalid="ignore"):
+        there = np.abs(eigenvalues) < 2.0 * np.pi * SHOWN  # false where there is no mode
+    # at two values at least (of several)
+    chosen = np.flatnonzero(there.sum(axis=0) >= min(2, len(there))).tolist()
     if not chosen:
         say(plane, f"no oscillation below {SHOWN:g} Hz")
         return figure
@@ -72,14 +74,6 @@ def _frame(damping: Axes, frequency: Axes, plane: Axes, locus: RootLocus) -> Non
     plane.set(xlabel="growth Re λ (1/s)", ylabel="frequency Im λ/2π (Hz)")
     plane.set(title=f"Root locus; arrows point towards higher {locus.key}")
     plane.set(xlim=(max(-40.0, plane.get_xlim()[0]), plane.get_xlim()[1]), ylim=(0.0, None))
-
-
-def _drawn(eigenvalues: Complexes) -> list[int]:
-    """Modes that exist at two values at least (of several) and stay below `SHOWN`."""
-    with np.errstate(invalid="ignore"):
-        low = np.abs(eigenvalues) < 2.0 * np.pi * SHOWN
-    there = np.isfinite(eigenvalues.real) & low
-    return [k for k in range(eigenvalues.shape[1]) if np.sum(there[:, k]) >= min(2, len(there))]
 
 
 def _colours(names: Sequence[str], chosen: Sequence[int]) -> dict[int, tuple[str, float]]:

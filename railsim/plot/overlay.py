@@ -1,6 +1,6 @@
 """The same quantities of several results in one picture, to be compared by eye."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
@@ -53,7 +53,11 @@ def overlay(
     title = _shared(list(results.values()))
     figure, cells, across = _cells(count, 1.5 if title else 1.3, words, title)
     together = zip_longest(*drawn.values())
-    places = _places(results.values())
+    places = {  # wheelsets as in the legends of histories: number and name
+        name: f"{number} {short}"
+        for result in results.values()
+        for number, (name, short) in enumerate(short_names(result.wheelsets).items(), start=1)
+    }
     for number, (axes, same) in enumerate(zip(cells, together, strict=True)):
         for index, (result, panel) in enumerate(zip(results.values(), same, strict=True)):
             for line in panel.lines if panel is not None else ():
@@ -137,15 +141,6 @@ def _shared(results: Sequence[Result]) -> str:
     )  # fmt: skip
     same = [names[0] for names in told if len(names) == len(results) and len(set(names)) == 1]
     return " · ".join(map(unformatted, same))
-
-
-def _places(results: Iterable[Result]) -> dict[str, str]:
-    """Wheelsets as in the legends of histories: number and name."""
-    return {
-        name: f"{number} {short}"
-        for result in results
-        for number, (name, short) in enumerate(short_names(result.wheelsets).items(), start=1)
-    }
 
 
 def _heading(held: Sequence[Panel], names: Mapping[str, str]) -> str:

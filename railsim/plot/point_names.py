@@ -1,6 +1,6 @@
 """Names beside the points of a drawing, where they cover neither each other nor the lines."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -15,6 +15,7 @@ REACHES = (5.0, 12.0, 20.0, 30.0)
 """Distances from point to name that are tried, the nearest first [points]."""
 DIRECTIONS = np.radians([20.0, 160.0, -20.0, -160.0, 90.0, -90.0, 55.0, 125.0, -55.0, -125.0])
 LEADER = 10.0  # distance from which a thin line joins name and point [points]
+LINE = {"arrowstyle": "-", "lw": 0.5, "color": "0.4", "shrinkA": 0.0, "shrinkB": 2.0}
 
 
 def name_points(axes: Axes, named: Mapping[str, Floats], drawn: Sequence[Floats]) -> None:
@@ -38,7 +39,9 @@ def name_points(axes: Axes, named: Mapping[str, Floats], drawn: Sequence[Floats]
         ]
         _, _, offset, box = min(found, key=lambda one: one[:2])
         boxes.append(box)
-        _write(axes, name, named[name], offset)
+        far = np.hypot(*offset) > LEADER + 0.29 * SIZE * len(name)
+        look: Any = {"fontsize": SIZE, "color": "k", "arrowprops": LINE if far else None}
+        note(axes, name, named[name], offset, "center", "center", **look).set_in_layout(False)
 
 
 def _along(line: Floats) -> Floats:
@@ -50,17 +53,15 @@ def _along(line: Floats) -> Floats:
     return np.concatenate(parts)
 
 
-def _candidates(name: str, point: Floats) -> list[tuple[float, Floats, Floats]]:
+def _candidates(name: str, point: Floats) -> Iterator[tuple[float, Floats, Floats]]:
     """Reach, offset of the name's middle, and box x0, y0, x1, y1 of every position tried."""
     half = np.array([0.29 * SIZE * len(name), 0.6 * SIZE])
-    found = []
     for reach in REACHES:
         for direction in DIRECTIONS:
             unit = np.array([np.cos(direction), np.sin(direction)])
             offset = unit * reach + np.array([np.sign(round(unit[0], 6)), unit[1]]) * half
             middle = point + offset
-            found.append((reach, offset, np.concatenate((middle - half, middle + half))))
-    return found
+            yield reach, offset, np.concatenate((middle - half, middle + half))
 
 
 def _cost(box: Floats, boxes: Sequence[Floats], frame: Floats, ink: Floats, marks: Floats) -> float:
@@ -70,10 +71,3 @@ def _cost(box: Floats, boxes: Sequence[Floats], frame: Floats, ink: Floats, mark
     over = sum(bool(np.all((box[:2] < o[2:]) & (box[2:] > o[:2]))) for o in boxes)
     out = bool(np.any(box[:2] < frame[:2]) or np.any(box[2:] > frame[2:]))
     return 1000.0 * over + 1000.0 * out + 60.0 * inside(marks) + 1.5 * inside(ink)
-
-
-def _write(axes: Axes, name: str, xy: Floats, offset: Floats) -> None:
-    far = np.hypot(*offset) > LEADER + 0.29 * SIZE * len(name)
-    line = {"arrowstyle": "-", "lw": 0.5, "color": "0.4", "shrinkA": 0.0, "shrinkB": 2.0}
-    look: Any = {"fontsize": SIZE, "color": "k", "arrowprops": line if far else None}
-    note(axes, name, xy, offset, "center", "center", **look).set_in_layout(False)

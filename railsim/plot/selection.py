@@ -5,7 +5,7 @@ A selection is the name of a quantity, followed by the labels that are wanted, i
 number from the leading end.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -66,7 +66,7 @@ def panels(result: Result, selections: tuple[str, ...] | list[str]) -> list[Pane
     return found
 
 
-def _panels(result: Result, selection: str) -> list[Panel]:
+def _panels(result: Result, selection: str) -> Iterator[Panel]:
     name, *labels = str(selection).split(":")
     drawable = [key for key, q in result.quantities.items() if q.dims[0] == "time" != key]
     if name not in drawable:
@@ -79,14 +79,11 @@ def _panels(result: Result, selection: str) -> list[Panel]:
     if len(lines) > MOST_LINES:
         example = ":".join((name, *(wanted[dim][0] for dim in per_line)))
         raise _fault(selection, f"{len(lines)} lines", f"choose some of them, such as {example}")
-    found = []
     for outer in product(*(wanted[dim] for dim in per_panel)):
-        drawn = []
-        for inner in lines:
-            where = dict(zip((*per_panel, *per_line), (*outer, *inner), strict=True))
-            drawn.append(Line(result.series(name, **where), where))
-        found.append(Panel(quantity.component(*outer) if outer else quantity, tuple(drawn)))
-    return found
+        dims = (*per_panel, *per_line)
+        places = [dict(zip(dims, (*outer, *inner), strict=True)) for inner in lines]
+        drawn = tuple(Line(result.series(name, **where), where) for where in places)
+        yield Panel(quantity.component(*outer) if outer else quantity, drawn)
 
 
 def _wanted(

@@ -32,7 +32,9 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
 
     `title`: By default vehicle, rails, friction and creep law.
     """
-    title = title or _title(found)
+    rails, friction, law = (found.conditions[key] for key in ("rails", "friction", "law"))
+    words = f"straight track, rails {rails}, friction {friction}, {law}"
+    title = title or f"{found.vehicle}\n{words}"
     if not found.branches:
         return _linear_figure(found, title)
     # shooting knows no forces
@@ -70,11 +72,6 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
         named.values(), named.keys(), loc="upper left", fontsize=7.5, borderpad=0.0
     )
     return figure
-
-
-def _title(found: CriticalSpeed) -> str:
-    rails, friction, law = (found.conditions[key] for key in ("rails", "friction", "law"))
-    return f"{found.vehicle}\nstraight track, rails {rails}, friction {friction}, {law}"
 
 
 def _shown(found: CriticalSpeed) -> tuple[float | None, float | None]:

@@ -67,7 +67,9 @@ def curves_figure(
     runs ended early; they bear crosses.
     """
     members = [None] if family is None else family.different
-    colours = _colours(len(members))
+    scale, last = matplotlib.colormaps["viridis"], max(1, len(members) - 1)
+    shades = [scale(0.92 * k / last) for k in range(len(members))]
+    colours = DISTINCT[: len(members)] if len(members) <= FEW else shades
     others = [None] * len(x.values) if family is None else family.values
     points = list(zip(x.values, others, strict=True))
     figure, cells = _panels(len(quantities))
@@ -85,7 +87,11 @@ def curves_figure(
             axes.set_xticks(range(len(x.different)), [unformatted(str(v)) for v in x.different])
             _turned(axes)
     if family is not None:
-        _legend(figure, cells[0], family.words)
+        handles, labels = cells[0].get_legend_handles_labels()
+        longest = max(map(len, labels), default=1)
+        fitting = max(1, int(figure.get_figwidth() / (0.45 + 0.075 * longest)))
+        look: Any = {"loc": "outside lower left", "alignment": "left", "title": family.words}
+        figure.legend(handles, labels, ncols=min(fitting, 8, len(labels)), **look)
     return figure
 
 
@@ -214,21 +220,6 @@ def _text(value: Any) -> str:
 def _panels(count: int) -> tuple[Picture, list[Axes]]:
     across, wide = (1, 6.8) if count == 1 else (2, 10.0)
     return grid_of(count, across, wide, 2.9, 1.0)
-
-
-def _colours(count: int) -> list[Any]:
-    if count <= FEW:
-        return list(DISTINCT[:count])
-    scale = matplotlib.colormaps["viridis"]
-    return [scale(0.92 * k / (count - 1)) for k in range(count)]
-
-
-def _legend(figure: Figure, axes: Axes, title: str) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    longest = max(map(len, labels), default=1)
-    fitting = max(1, int(figure.get_figwidth() / (0.45 + 0.075 * longest)))
-    look: Any = {"loc": "outside lower left", "alignment": "left", "title": title}
-    figure.legend(handles, labels, ncols=min(fitting, 8, len(labels)), **look)
 
 
 MOST_PAIRS = 6

@@ -4,7 +4,7 @@ Curvature and cant are always shown; gradient, irregularities, gauge, friction a
 they are not constant.  Constants stand in the line under the title.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -88,46 +88,38 @@ def _draw(axes: Axes, row: _Row, s: Floats) -> None:
         axes.set_ylim(min(axes.get_ylim()[0], -1.0), max(axes.get_ylim()[1], 1.0))
 
 
-def _alignment_rows(track: Track, alignment: Alignment, s: Floats) -> list[_Row]:
+def _alignment_rows(track: Track, alignment: Alignment, s: Floats) -> Iterator[_Row]:
     curvature = {"curvature": 1e3 * alignment.curvature(s)}
     cant = {"cant": 1e3 * alignment.cant(s)}
-    rows = [
-        ("Curvature, positive to the right", r"$\kappa$ (1/km)", curvature),
-        ("Cant, positive with the left rail higher", "$h$ (mm)", cant),
-    ]
+    yield "Curvature, positive to the right", r"$\kappa$ (1/km)", curvature
+    yield "Cant, positive with the left rail higher", "$h$ (mm)", cant
     if track.vertical:
         gradient = {"gradient": 1e3 * alignment.gradient(s)}
-        rows.append(("Gradient, positive uphill", "$i$ (‰)", gradient))
-    return rows
+        yield "Gradient, positive uphill", "$i$ (‰)", gradient
 
 
-def _rail_rows(track: Track, s: Floats) -> list[_Row]:
+def _rail_rows(track: Track, s: Floats) -> Iterator[_Row]:
     """Displacements of the rails by irregularities, and the gauge where it changes."""
     moved, without = shown_displacement(track), ""
     if names := refused(track):
         without = f", without the law {', '.join(names)}"
     if moved is None:
-        return []
+        return
     y_left, z_left, y_right, z_right = 1e3 * moved(s)[0]
     gauge = 1e3 * track.gauge + y_right - y_left
-    rows = []
     if track.irregularities:
         across, down = {"left": y_left, "right": y_right}, {"left": z_left, "right": z_right}
         words = "displacement of the rails, positive"
-        rows = [
-            (f"Lateral {words} to the right{without}", "$y$ (mm)", across),
-            (f"Vertical {words} downwards{without}", "$z$ (mm)", down),
-        ]
+        yield f"Lateral {words} to the right{without}", "$y$ (mm)", across
+        yield f"Vertical {words} downwards{without}", "$z$ (mm)", down
     if np.ptp(gauge) > 1e-6:
-        rows.append(("Gauge", "(mm)", {"gauge": gauge}))
-    return rows
+        yield "Gauge", "(mm)", {"gauge": gauge}
 
 
-def _table_rows(track: Track, s: Floats) -> list[_Row]:
+def _table_rows(track: Track, s: Floats) -> Iterator[_Row]:
     """Friction and support where they vary along the track."""
     words = "Stiffness and damping of the support, times those of the preset"
     support = None if track.support.preset == "rigid" else track.support.variation
-    rows = []
     for table, title, label, names in (
         (track.friction_table, "Friction", r"$\mu$", ("left", "right")),
         (support, words, "", ("pads", "ballast")),
@@ -135,8 +127,7 @@ def _table_rows(track: Track, s: Floats) -> list[_Row]:
         if table is not None:
             at, *columns = np.array(table).T
             curves = {n: np.interp(s, at, v) for n, v in zip(names, columns, strict=True)}
-            rows.append((title, label, curves))
-    return rows
+            yield title, label, curves
 
 
 def _constants(track: Track) -> str:

@@ -44,7 +44,9 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     colours = {kind: distinct(i) for i, kind in enumerate(kinds)}
     figure = Picture(11.0, 9.0, unformatted(title or vehicle.name))
     grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
-    end, boxes = _leading_end(flat), body_boxes(flat)
+    leader, *others = (w.position[0] for w in flat.of_kind("wheelset"))
+    last = min([leader, *(x for x in others if leader - x < BOGIE)])
+    end, boxes = (last - 0.8, leader + 0.8), body_boxes(flat)
     cells = (grid[0, :], grid[1, :], grid[2, 0], grid[2, 1], grid[2, 2])
     ends = (None, None, end, end, None)
     for cell, view, limits in zip(cells, (SIDE, TOP, SIDE, TOP, BEHIND), ends, strict=True):
@@ -56,14 +58,6 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
         _draw_view(axes, view, flat, colours, limits)
     figure.legend(handles=list(_handles(flat, colours)), loc="outside lower left", ncols=6)
     return figure
-
-
-def _leading_end(flat: FlatVehicle) -> Range:
-    """Range of x around the leading wheelset and its neighbours [m]."""
-    leader, *others = flat.of_kind("wheelset")
-    first = leader.position[0]
-    near = [first, *(w.position[0] for w in others if first - w.position[0] < BOGIE)]
-    return min(near) - 0.8, first + 0.8
 
 
 def _draw_view(
