@@ -6,7 +6,7 @@ The weighted residuals r(x) of all runs are minimised (trust region reflective, 
 singular value s of J says that the combination of parameters along its vector is known to 1/s.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -345,8 +345,12 @@ def _outcome(
                 one.run.name, name, one.run.selections[j], one.step, one.run.at,
                 one.measured[j], before[j], after[j], _rms(weights[j] * row), *test,
             ))  # fmt: skip
-    # directions of the parameters alone: the places of the runs are eliminated
-    _, values, vectors = np.linalg.svd(_without_places(jacobian[:data], count), full_matrices=False)
+    # directions of the parameters alone: what the places of the runs could explain is eliminated
+    own, by_places = jacobian[:data, :count], jacobian[:data, count:]
+    if by_places.shape[1]:
+        basis, _ = np.linalg.qr(by_places)
+        own = own - basis @ (basis.T @ own)
+    _, values, vectors = np.linalg.svd(own, full_matrices=False)
     places = [
         Place(one.run.name, float(shift), STRETCH * float(stretch))
         for one, (shift, stretch) in zip(
@@ -373,24 +377,13 @@ def _stretched(places: Sequence[Place], deviations: Floats) -> list[str]:
     ]
 
 
-def _at_bounds(parameters: Sequence[Parameter], x: Floats) -> list[str]:
+def _at_bounds(parameters: Sequence[Parameter], x: Floats) -> Iterator[str]:
     """Say which parameters end at a bound; a share of 0 or 1 is one of the profiles itself."""
-    remarks = []
     for one, coordinate in zip(parameters, x, strict=False):
         reach = min(SAME, NARROW * (one.bounds[1] - one.bounds[0]))
         for bound, end in zip(one.bounds, (one.low, one.high), strict=True):
             if abs(coordinate - bound) < reach and not (one.is_share and end in (0.0, 1.0)):
-                remarks.append(
+                yield (
                     f"{one.name} {AT_BOUND} of {end:g}: the best value may lie beyond it, "
                     "and the intervals do not hold."
                 )
-    return remarks
-
-
-def _without_places(jacobian: Floats, count: int) -> Floats:
-    """Return the derivatives to the parameters without what the places could explain."""
-    own, places = jacobian[:, :count], jacobian[:, count:]
-    if not places.shape[1]:
-        return own
-    basis, _ = np.linalg.qr(places)
-    return np.asarray(own - basis @ (basis.T @ own))

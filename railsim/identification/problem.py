@@ -88,15 +88,12 @@ class Problem:
             filters = [(channel.low_pass, channel.high_pass) for channel in one.run.amplifiers]
             digest.update(repr((*parts, one.run.speed, one.run.selections, filters)).encode())
             digest.update(one.run.at.tobytes())
-        for name in sorted(self._profiles()):
-            digest.update(load_profile(name).key())
-        self._inputs = digest.hexdigest()
-
-    def _profiles(self) -> set[str]:
-        """Return the names of all profiles in the runs, whose files may be changed in between."""
+        # files of profiles may be changed in between
         definitions = self.model.vehicle, *(one.run.track for one in self.runs)
         used = {name for definition in definitions for _, name, _ in used_profiles(definition)}
-        return used.union(*(parameter.profiles for parameter in self.parameters))
+        for name in sorted(used.union(*(parameter.profiles for parameter in self.parameters))):
+            digest.update(load_profile(name).key())
+        self._inputs = digest.hexdigest()
 
     def shortened(self, duration: float) -> "Problem":
         """Return the problem of the first seconds of each run."""

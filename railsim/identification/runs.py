@@ -229,7 +229,10 @@ def prepared(
         outputs["low_pass"] = {"frequency": 2.0 * high}
     else:
         how["output_rate"] = max(VARYING_RATE, FAR_ABOVE * high)
-        how["drive"] = {"mode": "table", "speed_table": _profile(measurement).tolist()}
+        rows = np.stack([measurement.distance, _smooth_speed(measurement)], axis=1)
+        rows = rows[:: max(1, round(measurement.rate))]  # one for each second
+        rising = np.diff(rows[:, 0], prepend=-np.inf) > 0.1
+        how["drive"] = {"mode": "table", "speed_table": rows[rising].tolist()}
     settings = Settings.model_validate(how)
     run = Run(
         measurement.name, track, measurement.definition.load, settings, mean, start,
@@ -278,13 +281,6 @@ def _smooth_speed(measurement: Measurement) -> Floats:
     step = max(1, round(measurement.rate))
     padded = np.pad(measurement.speed, (step // 2, step - 1 - step // 2), mode="edge")
     return np.convolve(padded, np.ones(step) / step, "valid")
-
-
-def _profile(measurement: Measurement) -> Floats:
-    """Return rows [s, v] of the measured speed, one for each second."""
-    step = max(1, round(measurement.rate))
-    rows: Floats = np.stack([measurement.distance, _smooth_speed(measurement)], axis=1)[::step]
-    return rows[np.diff(rows[:, 0], prepend=-np.inf) > 0.1]
 
 
 def simulated_run(measurement: Measurement, vehicle: Vehicle | str | Path | None = None) -> Result:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Complexes, Floats, stretches
-from railsim.definitions.excitations.recording import ORDER
+from railsim.definitions.excitations.recording import band_gain
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import even_line, is_uniform
 from railsim.files.access import make_folder, whole_file, write_text
@@ -167,7 +167,12 @@ class Irregularity(Estimated):
         recording = self.recording()
         _csv(path / FILES[0], {"s_m": recording.pop("s"),
                                **{f"{n}_mm": MILLI * v for n, v in recording.items()}})  # fmt: skip
-        write_text(path / FILES[1], self._track())
+        changes: dict[str, Any] = {"name": f"Track under {self.vehicle}", "irregularities": []}
+        if is_uniform(self.track):
+            changes |= even_line(float(np.ceil(self.s[-1])))
+        text, none = self.track.replace(**changes).to_toml(), "irregularities = []\n"
+        measured = f'irregularities = [{{ type = "measured", file = "{FILES[0]}" }}]\n'
+        write_text(path / FILES[1], text.replace(none, measured))
         columns: dict[str, Floats] = {"s_m": self.s}
         for q, name in enumerate(QUANTITIES):
             columns[f"{name}_mm"] = MILLI * self.values[q]
@@ -183,14 +188,6 @@ class Irregularity(Estimated):
             columns[f"{name}_deviation_{unit}"] = factor * rest
         _csv(path / FILES[3], columns)
         return [path / name for name in FILES]
-
-    def _track(self) -> str:
-        """Return the track that was run over, with the recording for its irregularities."""
-        changes: dict[str, Any] = {"name": f"Track under {self.vehicle}", "irregularities": []}
-        if is_uniform(self.track):
-            changes |= even_line(float(np.ceil(self.s[-1])))
-        recording = f'irregularities = [{{ type = "measured", file = "{FILES[0]}" }}]\n'
-        return self.track.replace(**changes).to_toml().replace("irregularities = []\n", recording)
 
 
 Forces = tuple[tuple[str, ...], Complexes, Floats]
@@ -221,7 +218,7 @@ def estimate_of(
     def over(spectra: Complexes | Floats) -> Floats:
         return np.fft.irfft(spectra, points, axis=1)[:, : len(piece.grid)]
 
-    gains = _gains(k)
+    gains = {name: band_gain(band)(k / (2.0 * np.pi)) for name, band in BANDS.items()}
     bands = {name: over(gain * found) for name, gain in gains.items()}
     deviations = {name: rms(gain**2 * error, points) for name, gain in gains.items()}
     return Estimate(
@@ -230,16 +227,6 @@ def estimate_of(
         wave_numbers=k, seen=seen, power=power,
         outputs=names, forces=over(outputs) + base, force_deviations=rms(rest, points),
     )  # fmt: skip
-
-
-def _gains(k: Floats) -> dict[str, Floats]:
-    """Magnitude of the band passes over the wave number, see `recording.band_passed`."""
-    found, f = {}, k / (2.0 * np.pi)
-    with np.errstate(divide="ignore"):
-        for name, (shortest, longest) in BANDS.items():
-            below = np.where(f > 0.0, 1.0 / longest / f, np.inf) ** (2 * ORDER)
-            found[name] = 1.0 / np.sqrt((1.0 + below) * (1.0 + (f * shortest) ** (2 * ORDER)))
-    return found
 
 
 def rms(power: Floats, points: int) -> Floats:

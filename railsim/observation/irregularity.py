@@ -11,7 +11,7 @@ right (`simulated.py`).  With these its contact is that of the sharpest place of
 divided into pieces (`pieces.py`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
@@ -150,7 +150,7 @@ def irregularity(
     return joined(measurement.name, vehicle.name, found, smooth.flanges, remarks, bare)
 
 
-def _other_curves(track: Track, read: Measurement, used: dict[str, str]) -> list[str]:
+def _other_curves(track: Track, read: Measurement, used: dict[str, str]) -> Iterator[str]:
     """Remark where a record has not the curves or cants of the track, by means over `WINDOW`.
 
     Compared are kappa, where there is a channel of it, and v^2 kappa - g sin(cant angle) with the
@@ -159,7 +159,7 @@ def _other_curves(track: Track, read: Measurement, used: dict[str, str]) -> list
     s, v, plan = read.distance, np.maximum(read.speed, 1.0), Alignment(track)
     turns = [read[n] / (v if n == "yaw_rate" else 1.0) for n in CURVATURES if n in read]
     across = [read[n] for n in used if used[n].endswith(".y") and not read.channel(n).high_pass]
-    kappa, remarks = plan.curvature(s), []
+    kappa = plan.curvature(s)
     steady = v**2 * kappa - GRAVITY * np.sin(plan.cant_angle(s))
     edges = np.searchsorted(s, np.arange(s[0], s[-1], WINDOW)).tolist()
     for words, channels, of_track, most in (
@@ -173,27 +173,25 @@ def _other_curves(track: Track, read: Measurement, used: dict[str, str]) -> list
         if len(far := np.flatnonzero(np.abs(off) > most)):
             k = far[np.argmax(np.abs(off[far]))]
             at, has = f"s = {s[edges[k]]:.0f} to {s[edges[k + 1]]:.0f} m", own[k] - off[k] + 0.0
-            remarks.append(
+            yield (
                 f"The record is not of the curves and cants of track '{track.name}': at {at} it "
                 f"has a {words.format(own[k])} in the mean, the track one of {has:.2g}; they "
                 f"differ by more than {most:g} in {len(far)} of {len(rows)} such lengths."
             )
-    return remarks
 
 
-def _curves(track: Track, measurement: Measurement) -> list[str]:
+def _curves(track: Track, measurement: Measurement) -> Iterator[str]:
     """Remark on curves, which the linear model does not have."""
     begin, end = measurement.distance[[0, -1]]
     curved = [c for c in curvature_sections(track)
               if (c.start_value or c.end_value) and c.begin < end and c.end > begin]  # fmt: skip
-    if not curved:
-        return []
-    low, high = min(c.begin for c in curved), max(c.end for c in curved)
-    return [
-        f"The track has curves between s = {low:.0f} and {high:.0f} m; the linear contact is that "
-        "of straight track: neither the estimate nor its standard deviations are to be relied "
-        "upon there; simulated runs know the curves."
-    ]
+    if curved:
+        low, high = min(c.begin for c in curved), max(c.end for c in curved)
+        yield (
+            f"The track has curves between s = {low:.0f} and {high:.0f} m; the linear contact is "
+            "that of straight track: neither the estimate nor its standard deviations are to be "
+            "relied upon there; simulated runs know the curves."
+        )
 
 
 class _Smooth:

@@ -104,8 +104,8 @@ class SimulatedRun:
         ahead = STEP * (points - len(s))
         share = np.interp(places, [s[0] - ahead, s[0], s[-1], s[-1] + AFTER], [0.0, 1.0, 1.0, 0.0])
         on_rails = (RAILS.T @ fields)[:, np.rint((places - s[0]) / STEP).astype(int) % points]
-        rows = np.vstack([places, share * on_rails]).T
-        irregularity = {"type": "measured", "rows": rows.tolist(), "fade": 0.0}
+        moved = np.vstack([places, share * on_rails]).T.tolist()
+        irregularity = {"type": "measured", "rows": moved, "fade": 0.0}
         changes: dict[str, Any] = {"irregularities": [irregularity]}
         end = float(s[-1]) + 0.5 * AFTER
         if self._uniform:
@@ -121,12 +121,11 @@ class SimulatedRun:
         if result.status != "complete":
             return f"{result.status}: {result.attributes['status_reason']}"
         rate = (len(result["time"]) - 1) / float(result["time"][-1] - result["time"][0])
-        channels = [
-            amplified(_series(result, name), rate, channel)
-            for name, channel in self.outputs.items()
-        ]
-        forces = [_series(result, name) for name in self.forces]
-        return Reading(*(self._on_grid(result, rows) for rows in (channels, forces)))
+        rows = [amplified(_series(result, name), rate, c) for name, c in self.outputs.items()]
+        rows += [_series(result, name) for name in self.forces]
+        at = result["distance"] + self._moved
+        both = np.array([on_grid(at, x, self.piece.grid) for x in rows])
+        return Reading(both[: len(self.outputs)], both[len(self.outputs) :])
 
     def _settings(self, s: Floats) -> Settings:
         if self._constant:
@@ -136,10 +135,6 @@ class SimulatedRun:
         table = np.column_stack([s, self.piece.speeds])[::SPEED_ROWS].tolist()
         drive = Drive(mode="table", speed_table=table)
         return Settings(output_rate=rate, outputs=OUTPUTS, drive=drive)
-
-    def _on_grid(self, result: Result, series: list[Floats]) -> Floats:
-        s = result["distance"] + self._moved
-        return np.array([on_grid(s, x, self.piece.grid) for x in series])
 
 
 def _series(result: Result, name: str) -> Floats:

@@ -261,7 +261,11 @@ def _miniprof(file: str, lines: list[str]) -> Points:
             key, _, value = text.partition("=")
             facts[key.strip().lower()] = value.strip()
             if key.strip().lower() == "columndef" and value:
-                columns = _miniprof_columns(file, number, value)
+                names = [name.strip().upper() for name in value.split(",")]
+                if "X" not in names or "Y" not in names:
+                    allowed = "the columns X and Y are needed"
+                    raise _fault(file, number, f"ColumnDef={value}", allowed)
+                columns = [names.index("X"), names.index("Y")]
             elif "=" not in text and "columndef" in facts:
                 raise _fault(file, number, f"not a pair of numbers: {_shown(words)}")
             continue
@@ -276,11 +280,3 @@ def _miniprof(file: str, lines: list[str]) -> Points:
             raise input_error(file, told, "a whole file, or as many XYPoints as it holds")
         found.notes.append(told)
     return found
-
-
-def _miniprof_columns(file: str, line: int, value: str) -> list[int]:
-    """Indices of X and Y in a column definition such as ``X,Y,A,C``."""
-    names = [name.strip().upper() for name in value.split(",")]
-    if "X" not in names or "Y" not in names:
-        raise _fault(file, line, f"ColumnDef={value}", "the columns X and Y are needed")
-    return [names.index("X"), names.index("Y")]

@@ -64,8 +64,9 @@ def recognised_profile(work: Points, kind: Kind | None = None) -> Profile:
     that kind.
     """
     kind = kind or work.kind
-    if kind is None:
-        kind = "wheel" if _looks_like_wheel(work) else "rail"
+    if kind is None:  # wheels are more than 95 mm wide, rail heads less
+        width = np.ptp(work.y) if work.y.size else 0.0
+        kind = "wheel" if width * (work.unit or (1e-3 if width > 1.0 else 1.0)) > 0.095 else "rail"
     if work.y.size < FEWEST_POINTS:
         raise work.fail(
             f"{work.y.size} points", f"a profile needs {FEWEST_POINTS} or more, 0.5 mm apart"
@@ -103,13 +104,6 @@ def recognised_profile(work: Points, kind: Kind | None = None) -> Profile:
         tuple(work.notes),
         measured=np.stack((work.y, work.z - level)) if smoothed else None,
     )
-
-
-def _looks_like_wheel(work: Points) -> bool:
-    """Guess for files that do not say: wheels are more than 95 mm wide, rail heads less."""
-    width = np.ptp(work.y) if work.y.size else 0.0
-    scale = work.unit or (1e-3 if width > 1.0 else 1.0)
-    return bool(width * scale > 0.095)
 
 
 def _to_metres(work: Points, kind: Kind) -> None:
@@ -263,7 +257,10 @@ def _orient_wheel(work: Points) -> None:
             ):
                 candidates.append((flat / height, sign, side))
     if not candidates:
-        hint = "it looks like a rail" if _rail_like(work) else "no flange with a tread beside it"
+        # whose contour falls on both sides, or on one side without turning back
+        tops, width = work.y[[np.argmin(work.z), np.argmax(work.z)]], np.ptp(work.y)
+        rail_like = width < 0.095 and (np.abs(tops - work.y[0]) > 0.05 * width).any()
+        hint = "it looks like a rail" if rail_like else "no flange with a tread beside it"
         raise work.fail(
             f"not a wheel profile: {hint}",
             "a wheel has a flange 15 to 50 mm high, round at its tip, and 30 mm or more of tread",
@@ -282,15 +279,6 @@ def _flange_side_first(work: Points) -> None:
     """Contour from the flange (gauge) side to the field side."""
     if work.y[0] > work.y[-1]:
         work.keep(np.arange(work.y.size)[::-1])
-
-
-def _rail_like(work: Points) -> bool:
-    """Whether the contour falls on both sides, or on one side without turning back."""
-    for z in (work.z, -work.z):
-        top = int(np.argmin(z))
-        if 0.05 * np.ptp(work.y) < abs(work.y[top] - work.y[0]) and np.ptp(work.y) < 0.095:
-            return True
-    return False
 
 
 def _shift_wheel(work: Points) -> None:

@@ -409,9 +409,8 @@ def test_a_record_of_curves_that_the_track_has_not_is_said_with_both_figures(cur
     )
     run = Measurement(definition, s / 27.8, s, np.full(len(s), 27.8), channels)
     used = {name: f"box_{name}.y" for name in "abcd"}
-    said = import_module("railsim.observation.irregularity")._other_curves(
-        curve if curved else STRAIGHT, run, used
-    )
+    other_curves = import_module("railsim.observation.irregularity")._other_curves
+    said = list(other_curves(curve if curved else STRAIGHT, run, used))
     assert len(said) == (0 if curved else 2)
     if not curved:
         assert "s = 400 to 500 m it has a curvature of 0.0017 1/m" in said[0]

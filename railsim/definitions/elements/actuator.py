@@ -1,6 +1,6 @@
 """Forces that follow a command or a law of one's own."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field
 
@@ -60,17 +60,9 @@ class CommandedElement(PointElement):
 
     def act(self, **values: object) -> Act:
         """Return what it becomes, with the values of its kind."""
-        return Act(
-            action=self.acts,
-            sense=-1.0 if self.against_axis else 1.0,
-            lag=self.lag,
-            delay=self.delay,
-            rate_limit=self.rate_limit,
-            force_limit=self.force_limit,
-            power_limit=self.power_limit,
-            stroke=self.stroke,
-            **values,  # type: ignore[arg-type]
-        )
+        same = "lag", "delay", "rate_limit", "force_limit", "power_limit", "stroke"
+        own: Any = {name: getattr(self, name) for name in same} | values
+        return Act(action=self.acts, sense=-1.0 if self.against_axis else 1.0, **own)
 
 
 class Actuator(CommandedElement):

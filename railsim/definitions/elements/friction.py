@@ -1,7 +1,7 @@
 """Dry friction: pads, leaf springs, side bearers, centre plates, wedges."""
 
 from math import cos, pi, sin, sqrt, tan
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -204,21 +204,14 @@ class CentrePlate(SlidingFriction, PairElement):
     def parts(self) -> list[tuple[str, base.Vector, Element]]:
         """Pads that carry the plate: suffix of the name, offset from the centre [m], pad."""
         found: list[tuple[str, base.Vector, Element]] = []
+        same = "bodies", "friction_coefficient", "sliding_ratio", "stribeck_speed"
+        of_each = "stiffness", "damping", "stick_stiffness", "preload"
         for ring, (radius, share) in enumerate(_gauss_on_ring(self.inner_radius, self.radius)):
+            own: dict[str, Any] = {name: getattr(self, name) for name in (*same, *of_each)}
+            own |= {n: 0.25 * share * own[n] for n in of_each if own[n] != "auto"}
+            pad = SideBearer(kind="side_bearer", point=NOTHING, **own)
             for quarter in range(4):
                 angle = 0.5 * pi * quarter + 0.25 * pi * ring
-                pad = SideBearer(
-                    kind="side_bearer",
-                    bodies=self.bodies,
-                    point=NOTHING,
-                    stiffness=0.25 * share * self.stiffness,
-                    damping=0.25 * share * self.damping,
-                    preload="auto" if self.preload == "auto" else 0.25 * share * self.preload,
-                    friction_coefficient=self.friction_coefficient,
-                    stick_stiffness=0.25 * share * self.stick_stiffness,
-                    sliding_ratio=self.sliding_ratio,
-                    stribeck_speed=self.stribeck_speed,
-                )
                 offset = (radius * cos(angle), radius * sin(angle), 0.0)
                 found.append((f"pad_{4 * ring + quarter + 1}", offset, pad))
         return found

@@ -37,15 +37,20 @@ def band_passed(values: Floats, step: float, wavelengths: tuple[float, float]) -
     `values`, shape (n_columns, n): rows at equal steps [m]; `step`: distance between rows [m];
     `wavelengths`: shortest and longest wavelength [m].
     """
+    reflected = np.concatenate((values, values[:, ::-1]), axis=1)
+    return _filtered(reflected, step, band_gain(wavelengths))[:, : values.shape[1]]
+
+
+def band_gain(wavelengths: tuple[float, float]) -> Gain:
+    """Magnitude of the band pass of `band_passed` over the spatial frequency [1/m]."""
+    low, high = 1.0 / wavelengths[1], 1.0 / wavelengths[0]
 
     def gain(f: Floats) -> Floats:
-        low, high = 1.0 / wavelengths[1], 1.0 / wavelengths[0]
         with np.errstate(divide="ignore"):
             below = np.where(f > 0.0, low / f, np.inf) ** (2 * ORDER)
         return np.asarray(1.0 / np.sqrt((1.0 + below) * (1.0 + (f / high) ** (2 * ORDER))))
 
-    reflected = np.concatenate((values, values[:, ::-1]), axis=1)
-    return _filtered(reflected, step, gain)[:, : values.shape[1]]
+    return gain
 
 
 def from_chord(values: Floats, step: float, chord: tuple[float, float]) -> Floats:

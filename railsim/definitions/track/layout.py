@@ -107,8 +107,8 @@ def track_remarks(track: "Track") -> list[Remark]:
         remarks.append(Remark(behind.key, text))
     text = "the gradient steps without a vertical curve (LIR)"
     remarks += [Remark(behind.key, text) for _, behind in _steps(vertical)]
-    remarks += _too_long("cant", cant, plan) + _too_long("vertical", vertical, plan)
-    remarks += _cant_sizes(cant) + _cant_sides(cant, plan) + _cant_base(cant, track.rail_base)
+    remarks += [*_too_long("cant", cant, plan), *_too_long("vertical", vertical, plan)]
+    remarks += [*_cant_sizes(cant), *_cant_sides(cant, plan), *_cant_base(cant, track.rail_base)]
     if max(track.frictions) > MOST_FRICTION:
         key = "friction_table" if track.friction_table else "friction"
         text = f"a coefficient of {max(track.frictions):g} is beyond that of steel on steel, below"
@@ -247,8 +247,7 @@ def _spans(track: "Track") -> Iterator[tuple[str, float, float, float | None]]:
 
 def _sections(name: str, elements: Sequence[TrackElement]) -> tuple[list[Section], list[Fault]]:
     """Return the sections of a list, with a fault for each end that is open or does not match."""
-    sections, faults = [], []
-    begin = 0.0
+    sections, faults, begin = list[Section](), list[Fault](), 0.0
     ends = [element.ends for element in elements]
     for index, element in enumerate(elements):
         before = ends[index - 1][1] if index > 0 else None
@@ -271,18 +270,17 @@ _END_KEYS = {"plan": "radius", "cant": "cant", "vertical": "gradient"}
 
 def _end_faults(
     key: str, kind: str, end: str, own: float | None, other: float | None
-) -> list[Fault]:
+) -> Iterator[Fault]:
     """Faults of one end of a ramp with its value and that of the neighbour there."""
     word = _END_KEYS[key.split(".")[0]]
     neighbour = "before" if end == "start" else "behind"
     if own is None and other is None:
         allowed = f"'{word}_{end}' here, as no element {neighbour} gives it"
-        return [Fault("", key, f"the {end} of the {kind} is open", allowed)]
+        yield Fault("", key, f"the {end} of the {kind} is open", allowed)
     if own is not None and other is not None and not _same(own, other):
         found = f"its {word} does not match the element {neighbour}"
         text = f"{_written(word, own)}, the element {neighbour} has {_written(word, other)}"
-        return [Fault("", f"{key}.{word}_{end}", text, found)]
-    return []
+        yield Fault("", f"{key}.{word}_{end}", text, found)
 
 
 def _same(a: float, b: float) -> bool:
@@ -302,40 +300,35 @@ def _steps(sections: Sequence[Section]) -> list[tuple[Section, Section]]:
     return [(a, b) for a, b in pairwise(sections) if not _same(a.end_value, b.start_value)]
 
 
-def _too_long(name: str, sections: Sequence[Section], plan: Sequence[Section]) -> list[Remark]:
-    if not sections or sections[-1].end <= plan[-1].end + SMALL:
-        return []
-    text = f"the list is longer ({sections[-1].end:g} m) than the plan ({plan[-1].end:g} m)"
-    return [Remark(name, text)]
+def _too_long(name: str, sections: Sequence[Section], plan: Sequence[Section]) -> Iterator[Remark]:
+    if sections and sections[-1].end > plan[-1].end + SMALL:
+        text = f"the list is longer ({sections[-1].end:g} m) than the plan ({plan[-1].end:g} m)"
+        yield Remark(name, text)
 
 
-def _cant_sizes(cant: Sequence[Section]) -> list[Remark]:
-    remarks = []
+def _cant_sizes(cant: Sequence[Section]) -> Iterator[Remark]:
     for section in cant:
         highest = max(abs(section.start_value), abs(section.end_value))
         if highest > HIGHEST_CANT:
-            remarks.append(Remark(section.key, f"a cant of {1e3 * highest:.0f} mm"))
+            yield Remark(section.key, f"a cant of {1e3 * highest:.0f} mm")
         if abs(section.slope) > STEEPEST_CANT_RAMP * (1.0 + 1e-9):
             text = f"a ramp of {1e3 * abs(section.slope):.2f} mm/m is steeper than the usual limit"
-            remarks.append(Remark(section.key, text))
-    return remarks
+            yield Remark(section.key, text)
 
 
-def _cant_base(cant: Sequence[Section], base: float) -> list[Remark]:
+def _cant_base(cant: Sequence[Section], base: float) -> Iterator[Remark]:
     """Remark on cant at another gauge, which railways of that gauge state over its own rails."""
     highest = max((abs(v) for s in cant for v in (s.start_value, s.end_value)), default=0.0)
-    if highest < SMALL or abs(base - CANT_BASE) <= WIDENED:
-        return []
-    text = (
-        f"is taken over {CANT_BASE:g} m at every gauge: {1e3 * highest:.0f} mm here are "
-        f"{1e3 * highest * base / CANT_BASE:.0f} mm between rails {base:.4g} m apart"
-    )
-    return [Remark("cant", text)]
+    if highest >= SMALL and abs(base - CANT_BASE) > WIDENED:
+        text = (
+            f"is taken over {CANT_BASE:g} m at every gauge: {1e3 * highest:.0f} mm here are "
+            f"{1e3 * highest * base / CANT_BASE:.0f} mm between rails {base:.4g} m apart"
+        )
+        yield Remark("cant", text)
 
 
-def _cant_sides(cant: Sequence[Section], plan: Sequence[Section]) -> list[Remark]:
+def _cant_sides(cant: Sequence[Section], plan: Sequence[Section]) -> Iterator[Remark]:
     """Remark on cant on a straight and on cant whose outer rail is the lower one."""
-    remarks = []
     for element in plan if cant else ():
         ends = corners(element, cant)
         # ends and middles of the stretches with one element of the cant
@@ -347,5 +340,4 @@ def _cant_sides(cant: Sequence[Section], plan: Sequence[Section]) -> list[Remark
             found = "cant on the wrong side, the outer rail is the lower one"
             astray = [abs(height) for kappa, height in pairs if kappa * height < 0.0]
         if max(astray, default=0.0) > ASTRAY_CANT:
-            remarks.append(Remark(element.key, f"{found}: {1e3 * max(astray):.0f} mm"))
-    return remarks
+            yield Remark(element.key, f"{found}: {1e3 * max(astray):.0f} mm")

@@ -139,24 +139,16 @@ def _embed(_: str, table: dict[str, Any]) -> None:
     if turn := table.get("trailing") is True:
         del table["trailing"]
     positions = (-found.positions[::-1] if turn else found.positions).tolist()
+    pairs = list(zip(positions, found.points[:: -1 if turn else 1], strict=True))
+    begin, end, shift = (table.get(key, 0.0) for key in ("begin", "end", "shift"))
+    if all(isinstance(value, int | float) for value in (begin, end, shift)):
+        inside = [k for k, at in enumerate(positions) if begin <= at + shift <= end]
+        # those in the range, and two beside it at either end
+        pairs = pairs[max(0, inside[0] - 2) : inside[-1] + 3] if inside else pairs
     table["contours"] = [
-        {"s": round(s, 6), "y": _written(points[0]), "z": _written(points[1])}
-        for s, points in zip(positions, found.points[:: -1 if turn else 1], strict=True)
-        if _needed(s, positions, table)
+        {"s": round(s, 6), "y": _written(y), "z": _written(z)} for s, (y, z) in pairs
     ]
 
 
 def _written(values: Any) -> list[float]:
     return [round(value, 7) for value in values.tolist()]
-
-
-def _needed(s: float, positions: list[float], table: dict[str, Any]) -> bool:
-    """Whether a section is in the range, or one of two beside it."""
-    begin, end, shift = (table.get(key, 0.0) for key in ("begin", "end", "shift"))
-    if not all(isinstance(value, int | float) for value in (begin, end, shift)):
-        return True
-    inside = [k for k, at in enumerate(positions) if begin <= at + shift <= end]
-    if not inside:
-        return True
-    k = positions.index(s)
-    return inside[0] - 2 <= k <= inside[-1] + 2
