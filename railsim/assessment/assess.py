@@ -163,7 +163,11 @@ def _by_runs(
             part = "; only the part before that is assessed" if name in found else ""
             remarks.append(f"{status_words(name, result)}{part}")
     about = vehicle, standard, tuple(runs)
-    driven = {name: (result.speed, *_rails(result)) for name, result in runs.items()}
+    driven = {}
+    for name, result in runs.items():
+        track = result.track()
+        rails = "; ".join(part.summary() for part in track.irregularities[:2])
+        driven[name] = result.speed, track.name, rails or "smooth rails"
     if standard == "safety":
         return Assessment(*about, safety=found, remarks=tuple(remarks))
     if standard == "wear":
@@ -184,10 +188,3 @@ def _by_runs(
         remarks.append(f"classes of {classes.edition} not checked against the printed standard")
     said_once = tuple(dict.fromkeys(remarks))
     return Assessment(*about, comfort=found, remarks=said_once, limits=classes, driven=driven)
-
-
-def _rails(result: Result) -> tuple[str, str]:
-    """Track and what displaces its rails, in words."""
-    track = result.track()
-    words = "; ".join(part.summary() for part in track.irregularities[:2])
-    return track.name, words or "smooth rails"

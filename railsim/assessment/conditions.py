@@ -20,7 +20,6 @@ from railsim.definitions.limits import (
     RunningLimits,
     Sourced,
     TrackTarget,
-    Value,
     Zone,
     up_to,
 )
@@ -238,17 +237,13 @@ def vehicle_conditions(
     required = f"{least.value:g} at least" if least else ""
     met = bool(least and lowest >= least.value)
     found.append(_compared("friction", "", words, least, required, met=met))
-    found.append(_gauge([run.track().gauge for run in runs], limits.gauge))
-    return found
-
-
-def _gauge(gauges: Sequence[float], nominal: Value | None) -> Condition:
-    """Limits of forces hold for the gauge for which they were found."""
+    gauges, nominal = [run.track().gauge for run in runs], limits.gauge
     ends = min(gauges), max(gauges)
     words = " to ".join(dict.fromkeys(f"{1e3 * gauge:.4g} mm" for gauge in ends))
+    # limits of forces hold for the gauge for which they were found
     required = f"{1e3 * nominal.value:.4g} mm, for which the limits hold" if nominal else ""
     met = bool(nominal and all(abs(end - nominal.value) <= WIDENED for end in ends))
-    return _compared("gauge", "", words, nominal, required, met=met)
+    return [*found, _compared("gauge", "", words, nominal, required, met=met)]
 
 
 def _conicity(

@@ -6,7 +6,7 @@ overestimates its magnitude, D = (S - M) sign(M); mean and standard deviation of
 a quantity stand against limits.  Values of sections in which a channel has a gap are left out.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -283,14 +283,13 @@ class _Run:
         said = [f"{run.name}: {words}" for words in (*run.remarks, *remarks)]
         return cls(part, result, channels, said)
 
-    def overlays(self) -> list[Overlay]:
-        run, found = self.measurement, []
+    def overlays(self) -> Iterator[Overlay]:
+        run = self.measurement
         for one in self.channels:
             read, made = (passed(x, run.rate, FORCES) for x in (one.measured, one.simulated))
             read = np.where(one.unknown, np.nan, read)
             about = run.name, one.name, one.quantity, run.distance, run.rate
-            found.append(Overlay(*about, read, made))
-        return found
+            yield Overlay(*about, read, made)
 
     def pairs(self, tests: RunningLimits, limits: ValidationLimits) -> list[Pair]:
         run, track = self.measurement, self.result.track()
@@ -302,7 +301,7 @@ class _Run:
 
         service = self.result.vehicle().service or SERVICE
         judged = [one for one in QUANTITIES.values() if one.name in limits.limits]
-        places = {quantity.name: self._places(quantity) for quantity in judged}
+        places = {quantity.name: [*self._places(quantity)] for quantity in judged}
         found: list[Pair] = []
         number = 0
         for section in track_sections(track, tests, service, covered, speed_at):
@@ -324,10 +323,10 @@ class _Run:
         ]
         return found
 
-    def _places(self, quantity: Compared) -> list[_Place]:
+    def _places(self, quantity: Compared) -> Iterator[_Place]:
         """Return a quantity at all places where it, or what it follows from, was measured."""
         by = {channel.quantity: channel for channel in self.channels}
-        base, found = quantity.base, []
+        base = quantity.base
         for selection, channel in by.items():
             kind, *labels = selection.split(":")
             used, side = [channel], None
@@ -349,8 +348,7 @@ class _Run:
             sources = [[c.measured for c in used], [c.simulated for c in used]]
             formed = [_formed(quantity, self.measurement.rate, x, side) for x in sources]
             both = [Signal(x[:, None], s[:, None], [(label, side)]) for x in formed]
-            found.append(_Place(used, both))
-        return found
+            yield _Place(used, both)
 
     def _in_section(self, quantity: Compared, section: TestSection, place: _Place) -> list[Pair]:
         """Return the values of a quantity at a place in a section."""

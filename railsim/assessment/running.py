@@ -1,7 +1,7 @@
 """Running tests after EN 14363 and UIC 518: all runs of a vehicle to zones and verdicts."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -109,7 +109,12 @@ def assess_running(
     limits = running_limits(standard, file)
     own = _own_sections(sections, runs) if sections else None
     service = service or _service(runs)
-    _known_category(limits, service, file or standard)
+    words = f"no '{service.category}'", "the vehicle's category"
+    Faults(
+        Fault(str(file or standard), f"limits.{name}.k1", *words)
+        for name, law in limits.limits.items()
+        if isinstance(law, ByAxleLoad) and service.category not in law.k1
+    ).check()
     done = []
     populations = _populations(runs)
     for name, result in runs.items():
@@ -172,15 +177,6 @@ def running_limits(standard: str, file: str | Path | None) -> RunningLimits:
     if limits.standard != standard:
         raise input_error(file, repr(limits.standard), f"wanted: '{standard}'", "standard")
     return limits
-
-
-def _known_category(limits: RunningLimits, service: Service, file: str | Path) -> None:
-    """Refuse limits without a factor of the vehicle's category."""
-    Faults(
-        Fault(str(file), f"limits.{name}.k1", f"no '{service.category}'", "the vehicle's category")
-        for name, law in limits.limits.items()
-        if isinstance(law, ByAxleLoad) and service.category not in law.k1
-    ).check()
 
 
 def common_service(runs: Mapping[str, Result], given: Collection[str] = ()) -> Service | None:
@@ -261,8 +257,8 @@ def _on_transitions(run: _Run, method: str, *, causal: bool) -> list[SectionValu
     return section_values(record, parts, causal=causal, criteria=criteria)
 
 
-def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
-    """Return the sections of a run with what the standard asks about them."""
+def _section_rows(run: _Run, service: Service) -> Iterator[SectionRow]:
+    """Yield the sections of a run with what the standard asks about them."""
     track = run.record.result.track()
     quality = None
     if run.sections and track.irregularities:
@@ -270,15 +266,13 @@ def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
         quality = TrackQuality(track, *ends, (D1, D2, D3))
     conicity = run.record.conicity if run.counting else math.nan
     realisation = repr(track.irregularities)
-    rows = []
     for s in run.sections:
         alignment, level = quality.deviations(s.begin, s.end) if quality else (0.0, 0.0)
         speed = min(s.speed, service.admissible_speed)
         name = quality_class(speed, alignment, level)
         further = quality.further(s.begin, s.end, speed) if quality else {}
         found = alignment, level, name, conicity, realisation, s in run.counting, further
-        rows.append(SectionRow(run.record.name, run.population, s, *found))
-    return rows
+        yield SectionRow(run.record.name, run.population, s, *found)
 
 
 def _remarks(

@@ -98,41 +98,36 @@ class Signals:
 
     def raw(self, name: str) -> Floats:
         """Quantity over the rows of the widest margin; ``acceleration`` is that of all sensors."""
-        return self._once(name, lambda: self._raw(name))
+        if name == "acceleration":
+            return self._once(name, lambda: self.record.readings(self._rows)[0])
+        return self._once(name, lambda: self.record.part(name, self._rows))
 
     def filtered(self, name: str, band: Band | None) -> Floats:
         """Quantity over the rows of the part with the margin of the filter, filtered once."""
-        return self._once((name, band), lambda: self._filtered(name, band))
+        return self._once((name, band), lambda: self.passed(self.near(self.raw(name), band), band))
 
-    def _raw(self, name: str) -> Floats:
-        if name == "acceleration":
-            return self.record.readings(self._rows)[0]
-        return self.record.part(name, self._rows)
-
-    def _near(self, band: Band | None) -> slice:
-        """Rows of the part with the margin of a filter, among those of the widest one."""
+    def near(self, x: Floats, band: Band | None) -> Floats:
+        """Of values over the rows of the widest margin those of the part with that of a filter."""
         corner = np.inf if band is None else band[1] if band[0] is None else band[0]
         margin = next(seconds for lowest, seconds in MARGINS if corner >= lowest)
         rows = self.record.rows_between(self._begin, self._end, margin)
-        return slice(rows.start - self._rows.start, rows.stop - self._rows.start)
+        return x[rows.start - self._rows.start : rows.stop - self._rows.start]
 
-    def _filtered(self, name: str, band: Band | None) -> Floats:
-        raw = self.raw(name)[self._near(band)]
-        return raw if band is None else self.passed(raw, band)
-
-    def passed(self, x: Floats, band: Band) -> Floats:
-        """Values over time through a filter."""
+    def passed(self, x: Floats, band: Band | None) -> Floats:
+        """Values over time through a filter, if there is one."""
+        if band is None:
+            return x
         flat = passed(x.reshape(len(x), -1), self.record.rate, band, causal=self.causal)
         return flat.reshape(x.shape)
 
     def s_wheelset(self, band: Band | None) -> Floats:
         """Arc lengths of the wheelsets over the rows of `filtered` [m]."""
-        return self.raw("wheelset_distance")[self._near(band)]
+        return self.near(self.raw("wheelset_distance"), band)
 
     def s_sensor(self, name: str, band: Band | None) -> Floats:
         """Arc length of a sensor over the same rows [m]."""
-        rows = self.record.distance[self._rows][self._near(band)]
-        return np.asarray(rows + self.record.sensor_offset(name))
+        s = self.near(self.record.distance[self._rows], band)
+        return np.asarray(s + self.record.sensor_offset(name))
 
 
 def _labels(signals: Signals) -> list[str]:
@@ -197,11 +192,9 @@ def _acceleration(signals: Signals, band: Band | None, axis: int, *, frames: boo
     columns = [k for k, name in enumerate(names) if name.startswith("frame_") == frames]
     if not columns:
         return None
-    near = signals._near(band)
-    raw = signals.raw("acceleration")[near][:, columns, axis]
+    raw = signals.near(signals.raw("acceleration"), band)[:, columns, axis]
     s = np.stack([signals.s_sensor(names[k], band) for k in columns], axis=-1)
-    values = raw if band is None else signals.passed(raw, band)
-    return Signal(values, s, [(names[k], None) for k in columns])
+    return Signal(signals.passed(raw, band), s, [(names[k], None) for k in columns])
 
 
 body_lateral = partial(_acceleration, axis=1, frames=False)

@@ -7,7 +7,7 @@ on track of one kind (spectra of the irregularities, friction, rails), whatever 
 import math
 import re
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -230,20 +230,18 @@ class _Pooled:
     limits: RunningLimits
     service: Service
 
-    def rows(self, criterion: Criterion) -> list[Assessed]:
+    def rows(self, criterion: Criterion) -> Iterator[Assessed]:
         """Estimates of a quantity, place by place, with their limits."""
         pairs: dict[str, list[tuple[float, list[float]]]] = defaultdict(list)
         for value in self.values:
             for (name, place), numbers in value.values.items():
                 if name == criterion.name:
                     pairs[place].append((value.section.cant_deficiency, numbers))
-        return [self._row(criterion, place, own) for place, own in pairs.items()]
-
-    def _row(self, criterion: Criterion, place: str, pairs: Pairs) -> Assessed:
-        row = self._judged(criterion, place, pairs, WELL_SPREAD)
-        others = (self._judged(criterion, place, pairs, border) for border in BESIDE)
-        differing = (one.estimate for one in others if one.exceeded != row.exceeded)
-        return replace(row, other=next(differing, None))
+        for place, own in pairs.items():
+            row = self._judged(criterion, place, own, WELL_SPREAD)
+            others = [self._judged(criterion, place, own, border) for border in BESIDE]
+            differing = [one.estimate for one in others if one.exceeded != row.exceeded]
+            yield replace(row, other=next(iter(differing), None))
 
     def _judged(self, criterion: Criterion, place: str, pairs: Pairs, border: float) -> Assessed:
         """Estimate and limit, two-dimensional where cant deficiencies span `border` or more."""
