@@ -49,7 +49,9 @@ def write_movie(
     writer: Any = (FFMpegWriter if film else PillowWriter)(fps=frames_per_second)
     figure = Figure(figsize=(8.0, 4.5 if scene.sections else 3.6), dpi=100)
     FigureCanvasAgg(figure)
-    view, sections = _axes(figure, scene)
+    view = figure.add_axes((0.0, 0.36, 1.0, 0.56) if scene.sections else (0.0, 0.0, 1.0, 0.9))
+    places = [(0.06 + 0.48 * k, 0.06, 0.42, 0.27) for k in range(2)] if scene.sections else []
+    sections = [figure.add_axes(place) for place in places]
     with whole_file(path) as partial:
         # the writers choose their format by the ending
         named = partial.with_name(partial.name + path.suffix.lower())
@@ -62,13 +64,6 @@ def write_movie(
         finally:
             named.unlink(missing_ok=True)
     return path
-
-
-def _axes(figure: Figure, scene: Scene) -> tuple[Axes, list[Axes]]:
-    if not scene.sections:
-        return figure.add_axes((0.0, 0.0, 1.0, 0.9)), []
-    view = figure.add_axes((0.0, 0.36, 1.0, 0.56))
-    return view, [figure.add_axes((0.06 + 0.48 * k, 0.06, 0.42, 0.27)) for k in range(2)]
 
 
 def draw(view: Axes, sections: list[Axes], scene: Scene, frame: int, gain: float = 1.0) -> None:

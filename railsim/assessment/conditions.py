@@ -7,7 +7,7 @@ A fault mode needs only one judged section, in any zone.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -143,16 +143,16 @@ def missing_zones(
 
 def zone_conditions(
     report: ZoneReport, rows: Sequence[SectionRow], limits: RunningLimits, service: Service
-) -> list[Condition]:
+) -> Iterator[Condition]:
     """Conditions of a zone; `rows` are its sections that count."""
     wanted, place, n = limits.zones[report.zone], report.title, len(report.values)
     outside = sum(bool(value.section.reason) for value in report.values)  # taken all the same
     enough = n >= wanted.sections and not outside
     words = f"{n}, {outside} of them outside the conditions of the zone" if outside else str(n)
     words = words if enough else "; ".join([words, *reasons(report.sections)])
-    found = [_number(place, words, wanted, met=enough)]
+    yield _number(place, words, wanted, met=enough)
     if not n:
-        return found
+        return
     lengths = [(v.section.end - v.section.begin, v.section.speed) for v in report.values]
     odd = [own for own, speed in lengths if abs(own - section_length(wanted, speed)) > 0.5]
     if odd:
@@ -160,23 +160,21 @@ def zone_conditions(
         words = f"{len(odd)} of {n} have {' to '.join(span)} m"
         standard = sorted({section_length(wanted, speed) for _, speed in lengths})
         required = " or ".join(f"{length:g} m" for length in standard)
-        about = "lengths of the sections", place, words, wanted, required
-        found.append(_compared(*about, met=False))
+        yield _compared("lengths of the sections", place, words, wanted, required, met=False)
     if (ends := wanted.mean_radius) is not None:
         met, wide = ends[0] <= report.radius <= ends[1], f"{ends[0]:.0f} to {ends[1]:.0f} m"
         radius = f"{beside_ends(report.radius, ends)} m"
-        found.append(_compared("mean radius", place, radius, wanted, wide, met=met))
+        yield _compared("mean radius", place, radius, wanted, wide, met=met)
     if wanted.radius is not None:
         right = sum(value.section.turn > 0 for value in report.values)
         words = f"{right} section{'s' * (right != 1)} to the right, {n - right} to the left"
         state = _stated(0 < right < n)
-        found.append(Condition("curves to both hands", place, state, words, "both", "ours"))
+        yield Condition("curves to both hands", place, state, words, "both", "ours")
     again = n - _independent(rows)
     words = f"{again} of {n} on irregularities that another section has as well"
     state = _stated(not again)
-    found.append(Condition("independent sections", place, state, words, "none", "ours"))
-    found.append(_quality(place, rows, limits.track_quality, service))
-    return found
+    yield Condition("independent sections", place, state, words, "none", "ours")
+    yield _quality(place, rows, limits.track_quality, service)
 
 
 def _independent(rows: Sequence[SectionRow]) -> int:

@@ -4,7 +4,7 @@ It pools the curves of zones 2 to 4 of a population: a quantity as a linear func
 deficiency and curvature, at the admissible cant deficiency and the mean radius of zone 4.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,9 +39,8 @@ class Influence:
         }  # fmt: skip
 
 
-def influences(reports: Sequence[ZoneReport], service: Service) -> list[Influence]:
+def influences(reports: Sequence[ZoneReport], service: Service) -> Iterator[Influence]:
     """Regressions of all wheel forces in curves, population by population."""
-    found = []
     target = np.array([service.cant_deficiency, 1.0 / RADIUS])
     for population in dict.fromkeys(report.population.name for report in reports):
         values = [v for r in reports if r.population.name == population for v in r.values]
@@ -53,5 +52,4 @@ def influences(reports: Sequence[ZoneReport], service: Service) -> list[Influenc
             y = np.array([v.values[name, place][0] for v in own])
             solved = multiple_regression(x, y, target)
             if solved is not None:
-                found.append(Influence(population, place, CRITERIA[name], solved))
-    return found
+                yield Influence(population, place, CRITERIA[name], solved)

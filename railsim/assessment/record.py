@@ -4,7 +4,7 @@ A result is read part by part: a record of 100 km needs no more memory than one 
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -250,16 +250,14 @@ class Record:
         last = int(np.searchsorted(self.distance, end - min(offsets))) + extra
         return slice(max(0, first), min(self.rows, last + 1))
 
-    def pieces(self, margin: float) -> list[tuple[slice, slice]]:
+    def pieces(self, margin: float) -> Iterator[tuple[slice, slice]]:
         """Parts of the whole record after the start: rows to read, and which of them count."""
         first = int(np.searchsorted(self.time, self.time[0] + START))
         size, extra = math.ceil(PIECE * self.rate), math.ceil(margin * self.rate)
-        found = []
         for begin in range(first, self.rows, size):
             end = min(begin + size, self.rows)
             low, high = max(0, begin - extra), min(self.rows, end + extra)
-            found.append((slice(low, high), slice(begin - low, end - low)))
-        return found
+            yield slice(low, high), slice(begin - low, end - low)
 
     def remarks(self) -> list[str]:
         """Notes on the record for the reader of the assessment."""

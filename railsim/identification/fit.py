@@ -146,7 +146,7 @@ def _solved(problem: Problem, loss: str) -> Identified:
     x = np.zeros(problem.size)
     if problem.place:
         x[problem.count :] = _places(problem, x)
-    remarks = _suspicions(problem, x, problem.series(x), clocks=False)
+    remarks = [*_suspicions(problem, x, clocks=False)]
     start = x.copy()
     bounds = np.array([one.bounds for one in problem.parameters]
                       + [(-np.inf, np.inf)] * (problem.size - problem.count)).T  # fmt: skip
@@ -172,7 +172,7 @@ def _solved(problem: Problem, loss: str) -> Identified:
     x, change = _with_own_derivatives(problem, x, bounds, loss)
     if change > CLOSE:
         remarks.append(f"The last step changed a parameter by {change:.2g} standard deviations.")
-    remarks += _suspicions(problem, x, problem.series(x), clocks=True)
+    remarks += _suspicions(problem, x, clocks=True)
     remarks += [f"{one.run.name}: {words}" for one in problem.runs
                 for words in one.measurement.remarks]  # fmt: skip
     return _outcome(problem, start, x, loss, list(dict.fromkeys(remarks)))
@@ -280,9 +280,8 @@ def _places(problem: Problem, x: Floats) -> Floats:
     return np.array(found)
 
 
-def _suspicions(problem: Problem, x: Floats, series: list[Floats], *, clocks: bool) -> list[str]:
-    remarks: list[str] = []
-    for one, values in zip(problem.placed(x), series, strict=True):
+def _suspicions(problem: Problem, x: Floats, *, clocks: bool) -> Iterator[str]:
+    for one, values in zip(problem.placed(x), problem.series(x), strict=True):
         measured, simulated = (
             {
                 n: banded(x, one.step, problem.form.band)
@@ -291,9 +290,8 @@ def _suspicions(problem: Problem, x: Floats, series: list[Floats], *, clocks: bo
             for rows in (one.measured, values)
         )
         quantities = dict(zip(one.names, one.run.selections, strict=True))
-        found = suspicions(measured, simulated, quantities, one.step, clocks=clocks)
-        remarks += [f"{one.run.name}: {words}" for words in found]
-    return remarks
+        for words in suspicions(measured, simulated, quantities, one.step, clocks=clocks):
+            yield f"{one.run.name}: {words}"
 
 
 def _weigh(problem: Problem, x: Floats, *, stated: bool) -> bool:

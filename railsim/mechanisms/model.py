@@ -4,7 +4,7 @@ A `Model` holds one mechanism with real numbers, or the same with several parame
 imaginary step each (`lanes`): whatever is computed from its numbers then carries exact derivatives.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -120,11 +120,8 @@ def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Mo
 
 def with_lanes(values: Mapping[str, float]) -> dict[str, Complexes]:
     """Values of parameters with a lane for each, in which it is moved by `1j * STEP`."""
-    moved = {}
-    for lane, (name, value) in enumerate(values.items()):
-        moved[name] = np.full((len(values), 1), value, dtype=complex)
-        moved[name][lane] += 1j * STEP
-    return moved
+    steps = 1j * STEP * np.eye(len(values))[..., np.newaxis]
+    return {name: values[name] + step for name, step in zip(values, steps, strict=True)}
 
 
 def real(value: Any) -> float:
@@ -228,12 +225,11 @@ class _Arrays:
         )  # fmt: skip
 
 
-def tangent_arcs(cam: Cam, x: Any, y: Any, values: Mapping[str, Any]) -> list[Any]:
+def tangent_arcs(cam: Cam, x: Any, y: Any, values: Mapping[str, Any]) -> Iterator[Any]:
     """Arcs that go on tangentially from a point: centre x, y, radius, ends of the kernel.
 
     The centre of an arc that turns left is the radius to the left of the path.
     """
-    found = []
     direction = number(cam.tangent, values)
     for arc in cam.arcs:
         assert arc.length is not None
@@ -242,12 +238,11 @@ def tangent_arcs(cam: Cam, x: Any, y: Any, values: Mapping[str, Any]) -> list[An
         cx, cy = x + radius * u, y + radius * v
         direction = direction + turn * number(arc.length, values) / radius
         u2, v2 = -turn * np.sin(direction), turn * np.cos(direction)
-        found.append((cx, cy, radius, [*map(real, (-u, -v, -u2, -v2)), turn]))
+        yield cx, cy, radius, [*map(real, (-u, -v, -u2, -v2)), turn]
         x, y = cx - radius * u2, cy - radius * v2
-    return found
 
 
-def centred_arcs(cam: Cam, values: Mapping[str, Any]) -> list[Any]:
+def centred_arcs(cam: Cam, values: Mapping[str, Any]) -> Iterator[Any]:
     """Arcs with given centres: centre x, y, radius, ends of the kernel.
 
     Where no angle is given an arc ends on the line through its centre and the next: there the
@@ -262,7 +257,6 @@ def centred_arcs(cam: Cam, values: Mapping[str, Any]) -> list[Any]:
         same = cam.arcs[i].turns == cam.arcs[i + 1].turns
         here = angle + (np.pi if same and real(radii[i]) < real(radii[i + 1]) else 0.0)
         shared.append((here, here if same else here + np.pi))
-    found = []
     for i, arc in enumerate(cam.arcs):
         turn = 1.0 if arc.turns == "left" else -1.0
         begin = shared[i - 1][1] if i > 0 else None
@@ -274,8 +268,7 @@ def centred_arcs(cam: Cam, values: Mapping[str, Any]) -> list[Any]:
             begin = end - turn * OPEN_ARC
         if end is None and begin is not None:
             end = begin + turn * OPEN_ARC
-        found.append((*centres[i], radii[i], [*_unit(begin), *_unit(end), turn]))
-    return found
+        yield *centres[i], radii[i], [*_unit(begin), *_unit(end), turn]
 
 
 def _unit(angle: float | None) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Results as tables and sentences in the field's units, for terminal, notebook and page."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -181,25 +181,25 @@ def _force_sentence(result: Analysis, driver: Callable[[float], str]) -> str:
     return f"force of '{result.definition.unknown}' {'; '.join(found)}; {largest}"
 
 
-def _contact_sentences(contact: Contact) -> list[str]:
+def _contact_sentences(contact: Contact) -> Iterator[str]:
     def forces(values: Mapping[str, float]) -> str:
         return ", ".join(
             f"{name} {value:.2f} N" if np.isfinite(value) else f"{name} no value"
             for name, value in values.items()
         )
 
-    found = [f"contact force at {contact.pressure / 1e6:.5f} MPa: {forces(contact.force)}"]
+    mean = f"contact force at {contact.pressure / 1e6:.5f} MPa: {forces(contact.force)}"
     if contact.rising != contact.falling:
-        found[0] += f" (mean); rising {forces(contact.rising)}; falling {forces(contact.falling)}"
-    found += [contact.reason] if contact.reason else []
+        mean += f" (mean); rising {forces(contact.rising)}; falling {forces(contact.falling)}"
+    yield mean
+    if contact.reason:
+        yield contact.reason
     for rest in contact.rests:
         word = "stable" if rest.stable else "unstable"
         end = f" to {rest.high * 1e3:.1f}" if rest.low < rest.high else ""
-        height = f"{rest.low * 1e3:.1f}{end}"
-        found.append(f"rests at a height of {height} mm without contact, {word}")
+        yield f"rests at a height of {rest.low * 1e3:.1f}{end} mm without contact, {word}"
     if not contact.rests and not contact.reason:
-        found.append("rests nowhere within the travel without contact")
-    return found
+        yield "rests nowhere within the travel without contact"
 
 
 def comparison_table(results: Sequence[Analysis]) -> Table:

@@ -69,7 +69,12 @@ def _draw_view(
     for body in flat.of_kind("wheelset"):
         _draw_wheelset(axes, body, view)
     for element in flat.elements:
-        _draw_element(axes, element, flat, view, colours[element.definition.kind])
+        for name, point in ((element.body1, element.point1), (element.body2, element.point2)):
+            if name:
+                _line(axes, (flat.body(name).position, point), view, color=LEVER, lw=0.5)
+        # a ring is an element whose points coincide, a dotted line one without points
+        look = {"color": colours[element.definition.kind], **_look(element)}
+        _line(axes, (element.point1, element.point2), view, zorder=3, **look)
     for body in flat.of_kind("axlebox"):
         axes.plot(body.position[across], body.position[upright], **BOX)
     together: dict[tuple[float, float], list[str]] = {}
@@ -100,16 +105,6 @@ def _name_bodies(axes: Axes, together: dict[tuple[float, float], list[str]], abo
         shift = (0, above + 9 * near)
         look: Any = {"color": BODY, "zorder": 6, "path_effects": HALO}
         note(axes, unformatted(words), (x, y), shift, "center", **look)
-
-
-def _draw_element(
-    axes: Axes, element: FlatElement, flat: FlatVehicle, view: View, colour: str
-) -> None:
-    """Draw an element; a ring is one whose points coincide, a dotted line one without points."""
-    for name, point in ((element.body1, element.point1), (element.body2, element.point2)):
-        if name:
-            _line(axes, (flat.body(name).position, point), view, color=LEVER, lw=0.5)
-    _line(axes, (element.point1, element.point2), view, color=colour, zorder=3, **_look(element))
 
 
 def _look(element: FlatElement) -> dict[str, Any]:

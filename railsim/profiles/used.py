@@ -40,9 +40,8 @@ def profile_hashes(*definitions: FileDefinition) -> dict[str, str]:
     return {name: sha256(load_profile(name).key()).hexdigest() for name in names}
 
 
-def profile_faults(definition: FileDefinition, file: str) -> list[Fault]:
-    """Return a fault with file and key for every profile that cannot be loaded."""
-    faults: list[Fault] = []
+def profile_faults(definition: FileDefinition, file: str) -> Iterator[Fault]:
+    """Yield a fault with file and key for every profile that cannot be loaded."""
     for key, name, kind in used_profiles(definition):
         try:
             load_profile(name, kind)
@@ -51,8 +50,7 @@ def profile_faults(definition: FileDefinition, file: str) -> list[Fault]:
             for fault in error.faults:
                 location = f", {fault.key}" if fault.key else ""
                 found = f"profile '{shown}'{location}: {fault.found}"
-                faults.append(Fault(file, key, found, fault.allowed))
-    return faults
+                yield Fault(file, key, found, fault.allowed)
 
 
 def _wheel_profiles(group: Vehicle | Assembly, path: tuple[str, ...]) -> Iterator[tuple[str, str]]:

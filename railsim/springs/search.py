@@ -13,7 +13,7 @@ from the design equations, the numbers of coils from the stiffnesses.  In four s
 Every limit is a slack, relative and positive when it is kept (`LIMITS` says what each one means).
 """
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeVar
@@ -366,7 +366,7 @@ def _rounded(task: Task, found: _Optimum, around: Floats) -> Steps[tuple[float, 
 
 def _nothing_fits(
     suspension: TrailingArmSuspension, result: SearchResult, optima: Sequence[_Optimum]
-) -> list[Fault]:
+) -> Iterator[Fault]:
     """The limits that the least broken nest breaks; without one, those that most candidates do."""
     nearest = max(optima, key=lambda optimum: optimum.worst)
     x = nearest.dimensions
@@ -374,7 +374,8 @@ def _nothing_fits(
     if nearest.worst >= _NEARLY:
         found = "no nest fits once its dimensions and coils are rounded"
         mend = "reduce search.diameter_step or search.coil_step, or raise search.height_error_max"
-        return [Fault(suspension.name, "search.diameter_step", found, mend)]
+        yield Fault(suspension.name, "search.diameter_step", found, mend)
+        return
     if nearest.worst > _FAR:
         missed = {name: -slack for name, slack in nearest.slack.items() if slack < 0.0}
         words = "is missed by {:.1%} at the best compromise (" + wires + ")"
@@ -382,9 +383,7 @@ def _nothing_fits(
         missed = {name: count / result.tried for name, count in result.broken.items() if count}
         words = "keeps out {:.0%} of the candidates"
     names = sorted(missed, key=lambda name: -missed[name])[:3]
-    faults = []
     for name in names:
         if missed[name] > 0.5 * missed[names[0]]:
             said = f"no nest fits: the limit '{name}' {words.format(missed[name])}"
-            faults.append(Fault(suspension.name, LIMITS[name][0], said, LIMITS[name][1]))
-    return faults
+            yield Fault(suspension.name, LIMITS[name][0], said, LIMITS[name][1])
