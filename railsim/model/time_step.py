@@ -183,10 +183,9 @@ class Stability:
 
     `system`, `state`: the model on straight and level track; steady rolling there; `scheme`: key of
     `SCHEMES`; `curving`: takes a step that is stable on straight track; returns systems and settled
-    states in the tightest curve: none where there is no flange contact, or one that has to have the
-    margin, and perhaps others for which half of it (its root) is enough; `on_straight`: takes
-    a step and what judges it on straight track, and returns the judgement; `steady`: whether no
-    wheel is set ringing in the run, by short irregularities, changing sections or radii.
+    states in the tightest curves, and the power of the margin that each has to have; `on_straight`:
+    takes a step and what judges it on straight track, and returns the judgement; `steady`: whether
+    no wheel is set ringing in the run, by short irregularities, changing sections or radii.
     """
 
     def __init__(
@@ -195,7 +194,7 @@ class Stability:
         system: System,
         state: Floats,
         scheme: str,
-        curving: Callable[[float], Sequence[Situation]],
+        curving: Callable[[float], Sequence[tuple[Situation, float]]],
         on_straight: Callable[[float, Callable[[], bool]], bool] = lambda _, judge: judge(),
         steady: bool = False,
     ) -> None:
@@ -203,7 +202,7 @@ class Stability:
         self._steady = steady
         self._on_straight = on_straight
         self._straight = system, state
-        self._flange: Sequence[Situation] | None = None
+        self._flange: Sequence[tuple[Situation, float]] | None = None
         self._allowed: dict[int, float] = {}
 
     @cached_property
@@ -271,8 +270,8 @@ class Stability:
                 return False
             self._flange = self._curving(min(h, self.longest))
         return all(
-            self._within(number, *at, h, margin if number == 1 else math.sqrt(margin))
-            for number, at in enumerate(self._flange, 1)
+            self._within(number, *at, h, margin**share)
+            for number, (at, share) in enumerate(self._flange, 1)
         ) and (first or self.holds_on_straight(h, margin))
 
     def _within(

@@ -1,4 +1,4 @@
-"""The vehicle in the tightest curve of its track, for judging the time step in flange contact.
+"""The vehicle in the tightest curves of its track, for judging the time step in flange contact.
 
 In a flange the contact is stiff laterally, and its damping and its friction couple the motions of a
 wheelset in another way than on the treads.
@@ -16,6 +16,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
+from railsim.kernels.contact_columns import W_Q
 from railsim.kernels.internal import PAD
 from railsim.kernels.state import ARC_LENGTH, LAST_STEP, SPEED
 from railsim.kernels.status import RUNNING
@@ -27,12 +28,14 @@ from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
 from railsim.model.check_rails import standing_at
 from railsim.model.equilibrium import tracks_under
+from railsim.model.time_step import empty_recorder, observed
 from railsim.model.work import CONSTANT_SPEED, uneven_rigid_rails, without_loads
 from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import alignment_of
 from railsim.track.tables import track_tables
 
 WIDEST = 1500.0  # m; in wider curves wheelsets run on their treads
+WIDER = 0.9  # curvature of the next curve over that of one where the vehicle leaves or wheels lift
 TIMES = 3.0, 3.0  # in transition and curve, at least, where the vehicle settles [s]
 # the same before Newton's method, and lengths [m]: the last wheelset has to be well in the curve
 SHORT, SHORT_LENGTHS = (0.5, 0.0), (20.0, 10.0)
@@ -44,38 +47,68 @@ BEGIN = 2.0
 MORE_DAMPING = 4.0
 
 
-def tightest_curve(track: Track) -> tuple[float, float] | None:
-    """Curvature [1/m] and cant [m] in the tightest curve; None where all are wide."""
+def tight_curves(track: Track) -> list[tuple[float, float]]:
+    """Curvature [1/m] and cant [m] of the curves that are not wide, from the tightest on."""
     sections = curvature_sections(track)
-    ends = [
-        (abs(value), value, s)
-        for section in sections
-        for value, s in ((section.start_value, section.begin), (section.end_value, section.end))
-    ]
-    size, curvature, s = max(ends)
-    if size < 1.0 / WIDEST:
-        return None
+    place = {}
     for section in sections:
-        if section.start_value == section.end_value == curvature:
-            s = 0.5 * (section.begin + section.end)
-            break
-    return curvature, float(alignment_of(track).cant(s))
+        place[section.start_value] = section.begin
+        place[section.end_value] = section.end
+    for section in reversed(sections):
+        if section.start_value == section.end_value:
+            place[section.end_value] = 0.5 * (section.begin + section.end)
+    tight = sorted((value for value in place if abs(value) >= 1.0 / WIDEST), key=abs)
+    alignment = alignment_of(track)
+    return [(value, float(alignment.cant(place[value]))) for value in reversed(tight)]
 
 
 def in_flange_contact(
     model: Model, track: Track, rolling: Floats, step: float, progress: Progress | None = None
-) -> tuple[System, Floats] | None:
-    """System on a curve as tight as the tightest one of the track, and the settled vehicle there.
+) -> list[tuple[System, Floats]]:
+    """Systems on curves as tight as the tightest ones of the track, and the settled vehicle there.
+
+    To the right and to the left, where the track has such: the tightest in which the vehicle stays
+    on the track at this speed, and where wheels lift there, wider ones until all are loaded.  Runs
+    may pass tighter curves slower, or end before them.
 
     `rolling`: steady rolling on straight track at the speed in question; `step`: of the fast
     scheme, stable on straight track [s]; `progress`: called repeatedly with the time simulated so
-    far and the time to simulate [s]. Returns None where all curves are wide, or the vehicle does
-    not stay on the track at this speed.
+    far and the time to simulate [s].
     """
-    curve = tightest_curve(track)
-    if curve is None:
-        return None
-    DOING.info("settling in flange contact, for judging the time step")
+    found = []
+    curves = tight_curves(track)
+    if curves:
+        DOING.info("settling in flange contact, for judging the time step")
+    for hand in (1.0, -1.0):
+        below = math.inf
+        for curve in curves:
+            if not 0.0 < hand * curve[0] < below:
+                continue
+            at = _settled(model, track, curve, rolling, step, progress)
+            if at is not None:
+                found.append(at)
+                if _all_loaded(model, *at):
+                    break
+            below = WIDER * abs(curve[0])
+    return found
+
+
+def _all_loaded(model: Model, system: System, state: Floats) -> bool:
+    """Whether every wheel carries load."""
+    recorder = empty_recorder(model, 1)
+    observed(system, state, recorder)
+    return bool(np.all(recorder.wheel[0, :, :, W_Q] > 0.0))
+
+
+def _settled(
+    model: Model,
+    track: Track,
+    curve: tuple[float, float],
+    rolling: Floats,
+    step: float,
+    progress: Progress | None,
+) -> tuple[System, Floats] | None:
+    """System on a curve and the settled vehicle; None where it does not stay on the track."""
     if not (model.system.internal.kind == PAD).any():
         start = rolling.copy()
         start[SPEED] = max(start[SPEED], BEGIN)

@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -219,23 +220,26 @@ class StepChoice:
             with suppress(NotConverged):  # then where the vehicle stands on those without factor
                 rolling = SteadyRolling(model, level).solve(rolling, speed)
 
-        def curving(step: float) -> list[Situation]:
-            at = in_flange_contact(model, self._track, rolling, step, self._progress)
-            if at is None:
-                return []
-            less = less_friction(self._track)
-            others = [(at[0], speed, part) for part in less[1:]]
-            if of_class:
-                others += [(at[0], CLASS * speed, 0.5 * FRICTION_CLASS + part) for part in less]
-            for system in guided(model, self._track, at[0]):
-                others += [(system, speed, less[0])]
-                if of_class:
-                    others += [(system, CLASS * speed, 0.5 * FRICTION_CLASS + less[0])]
-            found = [at]
-            for system, *other in others:
-                near = found[-1][1] if system is at[0] else at[1]
-                with suppress(NotConverged):  # then the others decide alone
-                    found.append(at_rest_beside(model, (system, near), *other))
+        ends = [(speed, 0.0)]
+        if of_class:
+            ends += [(CLASS * speed, 0.5 * FRICTION_CLASS)]
+        elif self.varies:
+            ends += [(CLASS * speed, 0.0)]
+
+        def curving(step: float) -> list[tuple[Situation, float]]:
+            found = []
+            for at in in_flange_contact(model, self._track, rolling, step, self._progress):
+                found.append((at, 1.0))
+                for system in (at[0], *guided(model, self._track, at[0])):
+                    near = system, at[1]
+                    for other in product(ends, less_friction(self._track)):
+                        (end, less), part = other
+                        if system is at[0] and end == speed and not part.any():
+                            continue
+                        with suppress(NotConverged):  # then the others decide alone
+                            beside = at_rest_beside(model, near, end, less + part)
+                            found.append((beside, 0.5))
+                            near = system, beside[1]
             return found
 
         digest = hashlib.sha256(f"{self._on_straight} {speed!r}".encode() + rolling.tobytes())
@@ -271,7 +275,8 @@ def class_speed(speed: float) -> float:
     >>> [round(class_speed(speed), 2) for speed in (18.5, 20.0, 22.0, 22.5)]
     [18.49, 18.49, 18.49, 22.19]
     """
-    lowest: float = CLASS ** math.floor(math.log(speed, CLASS))
+    # that of a lowest speed is itself: a run of changing speed is judged at the ends of its class
+    lowest: float = CLASS ** math.floor(math.log(speed, CLASS) + 1e-9)
     # at a standstill, which ends the run, there is no steady rolling
     return max(lowest, 1.02 * STANDSTILL_SPEED)
 

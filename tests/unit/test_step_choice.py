@@ -29,6 +29,7 @@ def test_runs_of_a_class_share_a_judgement_in_any_order(name, step, monkeypatch)
 
     def settled(model, track, state, step, progress):
         judged.append((float(state[-1]), float(model.system.track.rail[0, 4, 0])))
+        return []
 
     def steps(frictions):
         monkeypatch.setattr(step_choice, "_JUDGED", {})
@@ -238,3 +239,9 @@ def test_less_friction_along_the_track_is_judged_in_steps_of_a_class():
     rows = [[0.0, 0.45, 0.25], [10.0, 0.42, 0.22], [20.0, 0.15, 0.4], [30.0, 0.15, 0.4]]
     found = step_choice.less_friction(track.replace(friction_table=rows))
     assert found == pytest.approx(np.array([[0.0, 0.0], [0.0, 0.1], [0.3, 0.0]]))
+
+
+@pytest.mark.parametrize("number", range(-3, 28))
+def test_lowest_speed_of_a_class_is_in_this_class(number):
+    lowest = step_choice.class_speed(1.1 * 1.2**number)
+    assert step_choice.class_speed(lowest) == lowest
