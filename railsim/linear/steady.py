@@ -42,12 +42,17 @@ class NotConverged(ModelError):
 class SteadyRolling:
     """Newton's method for one vehicle on one track of constant curvature and cant.
 
-    `held`: whether the wheelsets stay where the guess has them.
+    `held`: whether the wheelsets stay where the guess has them; `accelerated`: whether the speed V
+    changes by the system's drive, with all that rolls: spin rates are then proportional to V.
     """
 
-    def __init__(self, model: Model, system: System, *, held: bool = False) -> None:
+    def __init__(
+        self, model: Model, system: System, *, held: bool = False, accelerated: bool = False
+    ) -> None:
         self.model = model
-        self.system = without_loads(system)._replace(drive=CONSTANT_SPEED)
+        self.system = without_loads(system)
+        if not accelerated:
+            self.system = self.system._replace(drive=CONSTANT_SPEED)
         self.work = work_arrays(system)
         self.patches = 0  # loaded ones, of the last evaluation
         self._unknowns, self._equations, self._inertias = conditions(model, system, held=held)
@@ -56,6 +61,7 @@ class SteadyRolling:
         self._wheelsets = np.flatnonzero(bodies.kind == WHEELSET)
         self._no_pitch = bodies.kind[self._rigid] == WHEELSET
         self._frames = bodies.frame[self._rigid]
+        self._spins = velocity_begin(model.index.n_bodies) + 6 * self._wheelsets + 4
 
     def solve(self, guess: Floats, speed: float) -> Floats:
         """Return the steady state nearest to a guess.
@@ -91,8 +97,7 @@ class SteadyRolling:
     def prepared(self, guess: Floats, speed: float) -> Floats:
         """Return a guess with the velocities of steady rolling at a speed [m/s]."""
         state = guess.copy()
-        n = self.model.index.n_bodies
-        spins = velocity_begin(n) + 6 * self._wheelsets + 4
+        n, spins = self.model.index.n_bodies, self._spins
         before = float(guess[-1])
         state[velocity_begin(n) : internal_begin(n)] = 0.0
         state[SPEED] = speed
@@ -124,7 +129,9 @@ class SteadyRolling:
         """What is not balanced, of one state or of several, one a row."""
         rows = np.atleast_2d(states)
         self._turn_with_frames(rows)
-        found = self._evaluated(rows)[:, self._equations] * self._inertias
+        rates = self._evaluated(rows)
+        rates[:, self._spins] -= rows[:, self._spins] * rates[:, [SPEED]] / rows[:, [SPEED]]
+        found = rates[:, self._equations] * self._inertias
         return np.asarray(found.reshape(*states.shape[:-1], -1))
 
     def _largest(self, forces: Floats) -> float:

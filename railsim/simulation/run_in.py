@@ -7,8 +7,8 @@ rails: the wheelsets would climb or fall.  Therefore the vehicle runs in:
   starting position over a transition, and keeps them until the vehicle has settled; the state at
   its end, relative to the track frames, is the initial state; or, if requested, the initial state
   is the steady state found by Newton's method;
-- on a straight gradient, or where the support of the rails varies, it is in the steady state there,
-  by Newton's method;
+- on a straight gradient, where the support of the rails varies, or the speed changes, it is in the
+  steady state there, by Newton's method;
 - into a transition, a ramp, a vertical curve or a range over which sections, support, friction or
   check rails change, over the real track, from the last position before it where the track under
   the vehicle is uniform, since its state depends on the twist, or the rails, passed;
@@ -45,7 +45,7 @@ from railsim.kernels.rails import (
 from railsim.kernels.rhs import locate_frames
 from railsim.kernels.state import ARC_LENGTH, SPEED, velocity_begin
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import RADIUS, System, Work
+from railsim.kernels.system import CONSTANT, RADIUS, TABLE, System, Work
 from railsim.kernels.time_loop import FAST
 from railsim.kernels.track_frame import FRAME_SIZE
 from railsim.linear.circle import POSITION, circle, placed
@@ -114,7 +114,8 @@ def start_state(
         if state is None:
             state = settled(model, balance, track, s, step, settling)
         if state is None:
-            state = initial_state(model, _standing(model, balance, track, s), s, frames)
+            standing = _standing(model, balance, track, s, at_start=not steps)
+            state = initial_state(model, standing, s, frames)
         state[ARC_LENGTH] = s
         if steps:
             follow_rails(model, state)
@@ -143,15 +144,26 @@ def _guided(system: System, check: CheckRails) -> System:
     return system._replace(contact=system.contact._replace(**check._asdict()))
 
 
-def _standing(model: Model, balance: Equilibrium, track: Track, s: float) -> Equilibrium:
-    """Return the balance on the gradient at `s`, and on rails supported as there."""
-    if not (len(model.system.support.variation) or _gradient(track, s)):
+def _standing(
+    model: Model, balance: Equilibrium, track: Track, s: float, *, at_start: bool
+) -> Equilibrium:
+    """Return the balance on the gradient and rails at `s`; at the start with the change of speed.
+
+    Where drives or brakes of axles change the speed too, it is that at constant speed.
+    """
+    drive = model.system.drive
+    driven = len(model.system.drives.body) > 0
+    accelerated = at_start and drive.mode != CONSTANT and not driven
+    if not (len(model.system.support.variation) or _gradient(track, s) or accelerated):
         return balance
-    there = _inclined(circle(track), track, s)
-    system = _supported(model.system, s)._replace(track=track_tables(there))
+    there = _inclined(circle(track, at=s), track, s)
+    if drive.mode == TABLE:
+        drive = drive._replace(table=drive.table + np.array([POSITION - s, 0.0]))
+    system = _supported(model.system, s)._replace(track=track_tables(there), drive=drive)
     speed = float(balance.state[SPEED])
     try:
-        state = SteadyRolling(model, system).solve(placed(balance.state), speed)
+        solver = SteadyRolling(model, system, accelerated=accelerated)
+        state = solver.solve(placed(balance.state), speed)
     except NotConverged:  # vehicle and rails settle as the run begins
         return balance
     state[-3:] = balance.state[-3:]
