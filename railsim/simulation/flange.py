@@ -30,12 +30,14 @@ from railsim.model.check_rails import standing_at
 from railsim.model.equilibrium import tracks_under
 from railsim.model.time_step import empty_recorder, observed
 from railsim.model.work import CONSTANT_SPEED, uneven_rigid_rails, without_loads
+from railsim.notation import ROLL, YAW, Y
 from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import alignment_of
 from railsim.track.tables import track_tables
 
 WIDEST = 1500.0  # m; in wider curves wheelsets run on their treads
 WIDER = 0.9  # curvature of the next curve over that of one where the vehicle leaves or wheels lift
+IN_THE_MIDDLE = 1e-6  # m, rad, of steady rolling on straight track
 TIMES = 3.0, 3.0  # in transition and curve, at least, where the vehicle settles [s]
 # the same before Newton's method, and lengths [m]: the last wheelset has to be well in the curve
 SHORT, SHORT_LENGTHS = (0.5, 0.0), (20.0, 10.0)
@@ -67,9 +69,9 @@ def in_flange_contact(
 ) -> list[tuple[System, Floats]]:
     """Systems on curves as tight as the tightest ones of the track, and the settled vehicle there.
 
-    To the right and to the left, where the track has such: the tightest in which the vehicle stays
-    on the track at this speed, and where wheels lift there, wider ones until all are loaded.  Runs
-    may pass tighter curves slower, or end before them.
+    To the right and to the left, where that makes a difference: the tightest in which the vehicle
+    stays on the track at this speed, and where wheels lift there, wider ones until all are loaded.
+    Runs may pass tighter curves slower, or end before them.
 
     `rolling`: steady rolling on straight track at the speed in question; `step`: of the fast
     scheme, stable on straight track [s]; `progress`: called repeatedly with the time simulated so
@@ -79,10 +81,11 @@ def in_flange_contact(
     curves = tight_curves(track)
     if curves:
         DOING.info("settling in flange contact, for judging the time step")
-    for hand in (1.0, -1.0):
+    hands = [[curve for curve in curves if hand * curve[0] > 0.0] for hand in (1.0, -1.0)]
+    for of_hand in [curves] if _symmetric(model, track, rolling) else hands:
         below = math.inf
-        for curve in curves:
-            if not 0.0 < hand * curve[0] < below:
+        for curve in of_hand:
+            if abs(curve[0]) >= below:
                 continue
             at = _settled(model, track, curve, rolling, step, progress)
             if at is not None:
@@ -91,6 +94,14 @@ def in_flange_contact(
                     break
             below = WIDER * abs(curve[0])
     return found
+
+
+def _symmetric(model: Model, track: Track, rolling: Floats) -> bool:
+    """Whether vehicle and rails are the same to the left and to the right."""
+    friction = np.array(track.friction_table or ((0.0, *track.friction),))
+    aside = rolling[: 6 * model.index.n_bodies].reshape(-1, 6)[:, [Y, ROLL, YAW]]
+    same = np.array_equal(friction[:, 1], friction[:, 2]) and not track.check_rail
+    return same and bool(np.abs(aside).max() < IN_THE_MIDDLE)
 
 
 def _all_loaded(model: Model, system: System, state: Floats) -> bool:
