@@ -106,7 +106,8 @@ class LowPass(base.Definition):
     """Filter between the time loop and the result, so that slow sampling folds nothing back."""
 
     frequency: base.Positive
-    """End of the pass band (`zero`), -3 dB (`causal`) [Hz]"""
+    """End of the pass band (`zero`), -3 dB (`causal`) [Hz]; at most `output_rate`/2.5 (`zero`),
+    /6.7 (`causal`)"""
     phase: Literal["zero", "causal"] = "zero"
     """`zero`: without phase, flat to `frequency` and nothing above `output_rate` - `frequency`;
     `causal`: Butterworth of order 4, as a measuring amplifier"""
@@ -121,7 +122,7 @@ class Outputs(base.Definition):
     """Time after the start that tables of peaks leave out [s]; by default 1 s, and no more than a
     tenth of the run; 0: none"""
     low_pass: LowPass | None = None
-    """Low pass of all quantities before they are stored at `output_rate`"""
+    """Low pass of all quantities before they are stored at `output_rate`; needs a constant speed"""
     sensors: base.Flag | Literal["readings"] = False
     """Motion of points: floor, bogie frames, axleboxes and the vehicle's `sensors`; accelerations
     also as accelerometers read them; `readings`: these and roll velocities alone"""
@@ -150,7 +151,8 @@ class Settings(FileDefinition):
     scheme: Literal["fast", "rk4"] = "fast"
     """Integration scheme: `fast`, or `rk4` as the reference"""
     step: Step | None = None
-    """Time step [s]; by default chosen from vehicle and speed"""
+    """Time step [s], at constant speed a whole part of the output interval; by default chosen from
+    vehicle and speed"""
     output_rate: Rate = 200.0
     """Output points per second [1/s]"""
     output_spacing: Spacing | None = None

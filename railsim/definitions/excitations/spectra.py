@@ -32,7 +32,7 @@ class Coefficients(Definition):
     vertical: NonNegative = 0.0
     """A_v of the longitudinal level [m rad]"""
     cross_level: NonNegative = 0.0
-    """Coefficient of the cross level instead of A_v [m rad]"""
+    """Coefficient of the cross level, A_v in ERRI B176; 0: no cross level [m rad]"""
     gauge: NonNegative = 0.0
     """A_g of the gauge [m rad]"""
     omega_c: Positive = 0.8246
