@@ -176,7 +176,7 @@ class Airspring(base.PreloadAlongAxes, base.PointElement):
     bellows_stiffness: Positive
     """Stiffness of the air in the bellows alone [N/m]"""
     reservoir_stiffness: NonNegative
-    """Further stiffness of the air in the reservoir [N/m]"""
+    """Stiffness of the air in the reservoir alone, in series with that of the bellows [N/m]"""
     area_stiffness: NonNegative = 0.0
     """Stiffness from the change of the effective area [N/m]"""
     orifice_damping: Positive
