@@ -139,7 +139,7 @@ class FileDefinition(Definition):
     def __dir__(self) -> list[str]:
         """Return names to complete: keys and what users call."""
         inside = {"KIND", "OPEN_TABLES", "complete", "contradictions", "format_name",
-                  "note_assigned", "table_faults"}  # fmt: skip
+                  "note_assigned", "settled", "table_faults"}  # fmt: skip
         return sorted(set(super().__dir__()) - inside)
 
     def _table(self) -> Table:

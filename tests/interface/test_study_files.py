@@ -512,7 +512,7 @@ def test_coarse_samples_of_an_assessment_in_a_study_are_told():
     settings = Settings(output_rate=100.0)
     check_outputs(load_vehicle(COACH), settings, 20.0, "en14363", coarse=True)
     assert coarse_remarks(settings, 20.0)[0].startswith("100 samples per second: too few")
-    assert coarse_remarks(settings.replace(output_spacing=0.02), 20.0) == ()  # 1000 per second
+    assert coarse_remarks(Settings(output_spacing=0.02), 20.0) == ()  # 1000 per second
 
 
 def test_only_the_longest_steps_are_tried_before_a_study_and_at_the_highest_speed(
