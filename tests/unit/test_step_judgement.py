@@ -42,7 +42,7 @@ def stability(monkeypatch):
         )  # fmt: skip
         monkeypatch.setattr(time_step, "_vehicle_growth", lambda *_: vehicle)
         model = SimpleNamespace(profiles={"w": SimpleNamespace(name="S1002")})
-        curving = [(system, state(k)) for k in range(1, len(flanges) + 1)]
+        curving = [((system, state(k)), 1.0 if k == 1 else 0.5) for k in growths if k]
         scheme = how.pop("scheme", "fast")
         return Stability(model, system, state(0), scheme, lambda _: curving, **how)
 
