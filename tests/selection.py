@@ -428,6 +428,39 @@ LONG = frozenset(
         "unit/test_solutions.py::"
         "test_tracks_of_other_curves_share_the_judgement_on_straight_track[other2-2]",
         "unit/test_definitions_schema.py::test_schema_file_is_up_to_date[railsim-mechanism/1]",
+        "verification/test_start_in_curve.py::"
+        "test_rails_are_supported_on_the_way_as_at_the_start[run-in]",
+        "verification/test_crossing_contact.py::test_shares_of_the_rails_add_up",
+        "interface/test_mechanism.py::test_changes_of_arcs_are_told",
+        "verification/test_strikes.py::"
+        "test_peaks_of_a_strike_are_those_of_the_reference[left-rigid-coach_flexicoil]",
+        "verification/test_speed.py::test_continued_run_gives_the_same_bytes[two_axle_wagon-free]",
+        "interface/test_optimise.py::"
+        "test_run_with_an_assessment_is_kept_when_only_the_analysis_changes",
+        "verification/test_controllers.py::"
+        "test_skyhook_decays_as_its_linearised_loop[0.0-sampled0]",
+        "interface/test_section_values.py::"
+        "test_every_value_of_a_section_is_that_of_its_filtered_tones[-1-4-23.0-265.0-70.0]",
+        "interface/test_verdicts.py::test_curves_to_one_hand_only_do_not_meet_the_conditions",
+        "verification/test_twin_tracks.py::"
+        "test_widening_of_one_rail_is_a_wider_track_beside_its_position",
+        "verification/test_convergence.py::"
+        "test_the_long_step_on_smooth_rigid_rails_agrees_with_the_reference_scheme[1.0-15.0-0.4]",
+        "reliability/test_surroundings.py::test_odd_surroundings[Turkish]",
+        "reliability/test_surroundings.py::test_closed_and_full_streams[<&- >&- 2>&--0]",
+        "interface/test_study.py::test_files_that_were_damaged_before_are_kept_too",
+        "interface/test_plot.py::test_wheelsets_in_a_curve_are_drawn_over_the_whole_width[9.0]",
+        "verification/test_check_rail.py::test_run_begins_on_the_check_rail[run-in]",
+        "interface/test_stationary.py::test_twisted_rails_of_another_gauge",
+        "interface/test_check_step.py::test_quiet_prints_no_remarks",
+        "verification/test_drives.py::test_brakes_stop_on_a_falling_gradient[drive1]",
+        "interface/test_study.py::"
+        "test_damaged_or_foreign_result_is_computed_again_and_kept[half a result]",
+        "interface/test_assess.py::test_law_of_a_file_in_the_assessment",
+        "verification/test_out_of_round.py::test_worn_flat_is_a_dip_of_the_rail[0.06]",
+        "interface/test_assess.py::test_lifted_wheel_is_reported_in_metres_and_is_no_number",
+        "verification/test_vehicles.py::"
+        "test_vehicle_runs_through_the_curve[articulated_three_bogies]",
     }
 )
 """Long tests, most of them beside others of the same thing; marked `further`."""
