@@ -71,7 +71,8 @@ def turned_vehicle(vehicle: V) -> V:
     Parts on both sides keep their names; its wheels roll the other way.
     """
     whole = _along(_rolling_back(mirrored_vehicle(vehicle)))
-    name = vehicle.name.removesuffix(TURNED) if TURNED in vehicle.name else vehicle.name + TURNED
+    before = vehicle.name.removesuffix(TURNED)
+    name = before if before != vehicle.name else f"{before}{TURNED}"
     return whole.model_copy(update={"name": name, "turned": False})
 
 

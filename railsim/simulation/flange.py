@@ -9,7 +9,9 @@ where Newton's method finds nothing, the vehicle settles over a long way.
 """
 
 import math
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 
 import numpy as np
 
@@ -87,7 +89,8 @@ def in_flange_contact(
         for curve in of_hand:
             if abs(curve[0]) >= below:
                 continue
-            at = _settled(model, track, curve, rolling, step, progress)
+            brought = partial(_brought, model, track, curve, progress)
+            at = _settled(model, rolling, step, brought)
             if at is not None:
                 found.append(at)
                 if _all_loaded(model, *at):
@@ -112,22 +115,20 @@ def _all_loaded(model: Model, system: System, state: Floats) -> bool:
 
 
 def _settled(
-    model: Model,
-    track: Track,
-    curve: tuple[float, float],
-    rolling: Floats,
-    step: float,
-    progress: Progress | None,
+    model: Model, rolling: Floats, step: float, brought: Callable[..., tuple[System, Floats] | None]
 ) -> tuple[System, Floats] | None:
-    """System on a curve and the settled vehicle; None where it does not stay on the track."""
+    """System on a curve and the settled vehicle; None where it does not stay on the track.
+
+    `brought`: brings the vehicle into the curve, as `_brought`.
+    """
     if not (model.system.internal.kind == PAD).any():
         start = rolling.copy()
         start[SPEED] = max(start[SPEED], BEGIN)
-        found = _brought(model, track, curve, start, step, progress, SHORT, SHORT_LENGTHS)
+        found = brought(start, step, SHORT, SHORT_LENGTHS)
         with suppress(NotConverged):
             if found is not None:
                 return found[0], _at_rest(model, *found, rolling)
-    return _brought(model, track, curve, rolling, 0.5 * step, progress, TIMES)
+    return brought(rolling, 0.5 * step, TIMES)
 
 
 def at_rest_beside(
@@ -161,9 +162,9 @@ def _brought(
     model: Model,
     track: Track,
     curve: tuple[float, float],
+    progress: Progress | None,
     rolling: Floats,
     step: float,
-    progress: Progress | None,
     times: tuple[float, float],
     *lengths: tuple[float, float],
 ) -> tuple[System, Floats] | None:
