@@ -96,8 +96,8 @@ def run_remarks(run: Run, swings: Hunting | None, seen: Result) -> tuple[str, ..
                 struck=bool(model.check.check.size),
                 centred=_centred(extremes),
                 slides=bool(model.system.track.rail[:, 4:, 0].any()),  # of both rails, in its cells
+                elastic=bool(support.elastic),
             ),
-            elastic=bool(support.elastic),
         ),
         alternation(run.work.vibration, Q0, wheelsets, int(run.work.parts[DIVIDED])),
         commanded_dampers(
@@ -330,13 +330,11 @@ def long_for_slip_control(step: float, below: float, slowest: float) -> str:
     )
 
 
-def vibration(
-    measured: Floats, Q0: Floats, wheelsets: Sequence[str], cause: str, *, elastic: bool
-) -> str:
+def vibration(measured: Floats, Q0: Floats, wheelsets: Sequence[str], cause: str) -> str:
     """Remark on wheel loads that vibrate, as a high pass at 40 Hz shows them.
 
     `measured`: see `railsim.kernels.vibration`; `Q0`: static wheel loads [N]; `cause`: see
-    `vibration_cause`; `elastic`: the rails.
+    `vibration_cause`.
     """
     if not len(measured):
         return ""
@@ -345,8 +343,6 @@ def vibration(
     if not share[w, side] > VIBRATES:
         return ""
     frequency, position = measured[w, side, FREQUENCY], measured[w, side, POSITION]
-    if not elastic:
-        cause += "; the rails are rigid, [support] of the track makes them elastic"
     return (
         f"The wheel loads vibrate at {frequency:.0f} Hz: {100.0 * share[w, side]:.0f} % of Q0 "
         f"(high pass {CUT_OFF:g} Hz) on the {SIDES[side]} wheel of {wheelsets[w]}, "
@@ -363,26 +359,36 @@ def vibration_cause(
     struck: bool = False,
     centred: bool = False,
     slides: bool = True,
+    elastic: bool = True,
 ) -> str:
     """What wheel loads vibrate from, in words.
 
     `hunts`: the vehicle; `uneven`: wheels are not round; `irregular`: the rails; `varying`: their
     support; `struck`: there are check rails, whose blow or friction may be the cause; `centred`: no
-    wheelset leaves the middle of the track; `slides`: there is friction.  Of what is there only it
-    is not known how much it excites; where none of it is, what is left must be the cause.
+    wheelset leaves the middle of the track; `slides`: there is friction; `elastic`: the rails.  Of
+    what is there only it is not known how much it excites, nor on rigid rails whether the vehicle
+    excites itself besides; where none of it is, what is left must be the cause.
     """
+    perhaps = {
+        "wheels that are not round": uneven,
+        "the irregularities or sections of the rails": irregular,
+        "the support of the rails, which varies along the track": varying,
+    }
+    by = next((words for words, there in perhaps.items() if there), "")
     if hunts:
-        return "the vehicle hunts"
-    if uneven:
-        return "perhaps excited by wheels that are not round"
-    if irregular:
-        return "perhaps excited by the irregularities or sections of the rails"
-    if varying:
-        return "perhaps excited by the support of the rails, which varies along the track"
-    if centred:
-        return "excited by the gradient, by applied forces or by the start, on smooth rails"
-    if not slides:
+        cause = "the vehicle hunts"
+    elif by:
+        cause = f"perhaps excited by {by}"
+        if slides and not elastic:
+            cause += ", or self-excited by sliding friction in flange contact: then smooth rails "
+            cause += "show it, too"
+    elif centred:
+        cause = "excited by the gradient, by applied forces or by the start, on smooth rails"
+    elif not slides:
         by = "a check rail or " if struck else ""
-        return f"excited by {by}blows of the flanges, on smooth rails without friction"
-    by = "excited by a check rail, or" if struck else "self-excited by"
-    return f"{by} sliding friction in flange contact, on smooth rails"
+        cause = f"excited by {by}blows of the flanges, on smooth rails without friction"
+    else:
+        by = "excited by a check rail, or" if struck else "self-excited by"
+        cause = f"{by} sliding friction in flange contact, on smooth rails"
+    rigid = "; the rails are rigid, [support] of the track makes them elastic"
+    return cause if elastic else cause + rigid

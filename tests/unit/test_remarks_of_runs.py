@@ -127,12 +127,25 @@ def test_the_remark_on_vibrations_contradicts_neither_itself_nor_another(of, cau
     """
     measured = np.zeros((2, 2, VIBRATION))
     measured[1, 0, [AMPLITUDE, FREQUENCY]] = 7e3, 35.2
-    remark = vibration(
-        measured, np.full((2, 2), 70e3), ("a", "b"), vibration_cause(**of), elastic=True
-    )
+    remark = vibration(measured, np.full((2, 2), 70e3), ("a", "b"), vibration_cause(**of))
     assert remark.startswith("The wheel loads vibrate at 35 Hz: 10 % of Q0")
     assert "above" not in remark
     assert cause in remark
+    assert "the rails are rigid" not in remark
+
+
+@pytest.mark.parametrize(("slides", "elastic"), [(True, False), (False, False), (True, True)])
+def test_on_rigid_rails_irregularities_are_not_the_only_possible_cause(slides, elastic):
+    """`locomotive_coco_a`, R 250 m, friction 0.4, 20 m/s: a mode at 95 Hz grows by 23 1/s.
+
+    So it does by LSODA.  Wheel loads sway by 350 % of Q0 with irregularities and without; not with
+    friction 0.2, nor on elastic rails.
+    """
+    cause = vibration_cause(irregular=True, slides=slides, elastic=elastic)
+    assert ("or self-excited by sliding friction" in cause) == (slides and not elastic)
+    assert (
+        cause.endswith("the rails are rigid, [support] of the track makes them elastic") != elastic
+    )
 
 
 @pytest.mark.parametrize("frequency", [30.0, 60.0, 150.0])
@@ -324,12 +337,10 @@ def test_forces_that_alternate_are_told_from_a_share_of_the_wheel_load(divided, 
 def test_vibrations_are_told_from_a_twentieth_of_the_wheel_load(share, said):
     measured = np.zeros((2, 2, VIBRATION))
     measured[0, 1, [AMPLITUDE, FREQUENCY, POSITION]] = share * 60e3, 80.0, 12.0
-    for elastic in (False, True):
-        found = vibration(measured, Q0, NAMES, "x", elastic=elastic)
-        assert (
-            "at 80 Hz" in found and "right wheel of front, vehicle at s = 12 m" in found
-        ) == said
-        assert ("makes them elastic" in found) == (said and not elastic)
+    found = vibration(measured, Q0, NAMES, "x")
+    assert (
+        "at 80 Hz" in found and "right wheel of front, vehicle at s = 12 m; x." in found
+    ) == said
 
 
 @pytest.mark.parametrize(
