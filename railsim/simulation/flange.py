@@ -25,12 +25,12 @@ from railsim.kernels.status import RUNNING
 from railsim.kernels.support import DOF
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
-from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
-from railsim.linear.steady import NotConverged, SteadyRolling
+from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT, Y_LEFT, Y_RIGHT
+from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.assembly import Model
 from railsim.model.check_rails import standing_at
 from railsim.model.equilibrium import tracks_under
-from railsim.model.time_step import empty_recorder, observed
+from railsim.model.time_step import Situation, empty_recorder, observed
 from railsim.model.work import CONSTANT_SPEED, uneven_rigid_rails, without_loads
 from railsim.notation import ROLL, YAW, Y
 from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
@@ -68,7 +68,7 @@ def tight_curves(track: Track) -> list[tuple[float, float]]:
 
 def in_flange_contact(
     model: Model, track: Track, rolling: Floats, step: float, progress: Progress | None = None
-) -> list[tuple[System, Floats]]:
+) -> list[Situation]:
     """Systems on curves as tight as the tightest ones of the track, and the settled vehicle there.
 
     To the right and to the left, where that makes a difference: the tightest in which the vehicle
@@ -115,8 +115,8 @@ def _all_loaded(model: Model, system: System, state: Floats) -> bool:
 
 
 def _settled(
-    model: Model, rolling: Floats, step: float, brought: Callable[..., tuple[System, Floats] | None]
-) -> tuple[System, Floats] | None:
+    model: Model, rolling: Floats, step: float, brought: Callable[..., Situation | None]
+) -> Situation | None:
     """System on a curve and the settled vehicle; None where it does not stay on the track.
 
     `brought`: brings the vehicle into the curve, as `_brought`.
@@ -131,9 +131,7 @@ def _settled(
     return brought(rolling, 0.5 * step, TIMES)
 
 
-def at_rest_beside(
-    model: Model, at: tuple[System, Floats], speed: float, less: float | Floats
-) -> tuple[System, Floats]:
+def at_rest_beside(model: Model, at: Situation, speed: float, less: float | Floats) -> Situation:
     """System and state of rest at another speed and with less friction, by Newton's method.
 
     `at`: system and vehicle at rest on a curve; `speed`: [m/s]; `less`: taken from the coefficients
@@ -148,14 +146,34 @@ def at_rest_beside(
     return system, SteadyRolling(model, system).solve(state, speed)
 
 
-def guided(model: Model, track: Track, system: System) -> list[System]:
-    """Return a system with the check rails where each of the track's is nearest to its rail."""
+def guided(model: Model, track: Track, at: Situation) -> list[Situation]:
+    """Return a situation with the check rails where each of the track's is nearest to its rail."""
     found = []
+    system, state = at
     for rail in track.check_rail:
         s, _ = min(rail.flangeway, key=lambda row: row[1])
         check = standing_at(model.check, s)
-        found.append(system._replace(contact=system.contact._replace(**check._asdict())))
+        contact = system.contact._replace(**check._asdict())
+        found.append((system._replace(contact=contact), state))
     return found
+
+
+def narrowed(model: Model, track: Track, at: Situation) -> list[Situation]:
+    """Return a situation led to the track's narrowest gauge, if that is narrower than usual."""
+    system, state = at
+    _, left, right = min(track.gauge_widening or ((0.0, 0.0, 0.0),), key=lambda row: sum(row[1:]))
+    if left + right >= 0.0:
+        return []
+
+    def moved(share: float) -> tuple[System, float]:
+        rail = system.track.rail.copy()
+        rail[:, Y_LEFT, 0], rail[:, Y_RIGHT, 0] = -share * left, share * right
+        table = system.track._replace(rail=rail, has_irregularity=1)
+        return system._replace(track=table), float(state[SPEED])
+
+    with suppress(NotConverged):  # then the usual gauge decides alone
+        return [(moved(1.0)[0], led(model, moved, state)[0])]
+    return []
 
 
 def _brought(
@@ -167,7 +185,7 @@ def _brought(
     step: float,
     times: tuple[float, float],
     *lengths: tuple[float, float],
-) -> tuple[System, Floats] | None:
+) -> Situation | None:
     """System on the curve, and the vehicle at the end of its way; None where it leaves the rails.
 
     `times`, `lengths`: of `curve_to_settle_in`.

@@ -38,7 +38,7 @@ from railsim.model.solutions import solution
 from railsim.model.time_step import Situation, Stability
 from railsim.model.work import level_track_with_friction, uneven_rigid_rails
 from railsim.simulation.auxiliary_track import Progress
-from railsim.simulation.flange import at_rest_beside, guided, in_flange_contact
+from railsim.simulation.flange import at_rest_beside, guided, in_flange_contact, narrowed
 from railsim.track.irregularity import shortest_wave
 
 CLASS = 1.2  # ratio of the speeds of a class
@@ -230,16 +230,17 @@ class StepChoice:
             found = []
             for at in in_flange_contact(model, self._track, rolling, step, self._progress):
                 found.append((at, 1.0))
-                for system in (at[0], *guided(model, self._track, at[0])):
-                    near = system, at[1]
+                where = model, self._track, at
+                for place in (at, *guided(*where), *narrowed(*where)):
+                    near = place
                     for other in product(ends, less_friction(self._track)):
                         (end, less), part = other
-                        if system is at[0] and end == speed and not part.any():
+                        if place is at and end == speed and not part.any():
                             continue
                         with suppress(NotConverged):  # then the others decide alone
                             beside = at_rest_beside(model, near, end, less + part)
                             found.append((beside, 0.5))
-                            near = system, beside[1]
+                            near = place[0], beside[1]
             return found
 
         digest = hashlib.sha256(f"{self._on_straight} {speed!r}".encode() + rolling.tobytes())
