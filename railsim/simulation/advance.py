@@ -16,7 +16,7 @@ from railsim.errors import RailsimError
 from railsim.kernels.compiler import entry
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
-from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
+from railsim.kernels.state import ARC_LENGTH, LAST_STEP, SPEED, TIME
 from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.kernels.vibration import AMPLITUDE
@@ -113,7 +113,8 @@ class Run:
         self.unloaded = np.zeros_like(self.work.unloaded)  # before the evaluation [s]
         self.derivative = np.zeros_like(self.state)
         self.stages = np.zeros((3, len(self.state)))
-        self.fresh = prepared.fresh  # whether nothing was before the state
+        # whether nothing was before the state
+        self.fresh = prepared.fresh and prepared.state[LAST_STEP] == 0.0
         self.evaluates = bool(self.state[TIME] >= prepared.evaluation - ROUND_OFF)
         self.varies = prepared.steps.varies
         # equal steps of distance while the speed changes: the last step of an interval ends there

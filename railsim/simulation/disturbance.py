@@ -9,6 +9,7 @@ from railsim.arrays import Floats, first_largest
 from railsim.definitions.settings import InitialState, Settings
 from railsim.kernels.contact_columns import W_Q
 from railsim.kernels.rhs import right_hand_sides
+from railsim.kernels.state import LAST_STEP
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import Work
 from railsim.model.assembly import Model
@@ -39,6 +40,7 @@ def disturb(model: Model, Q0: Floats, settings: Settings, state: Floats) -> tupl
         return ()
     loads_of = partial(_wheel_loads, model, work_arrays(model.system))
     before = loads_of(state)
+    state[LAST_STEP] = 0.0  # the scheme's memory is of the state before
     for name, change in settings.initial.items():
         _add(model, name, change, state)
     remarks = []

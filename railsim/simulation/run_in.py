@@ -43,7 +43,7 @@ from railsim.kernels.rails import (
     locate_rails,
 )
 from railsim.kernels.rhs import locate_frames
-from railsim.kernels.state import ARC_LENGTH, SPEED, velocity_begin
+from railsim.kernels.state import ARC_LENGTH, LAST_STEP, SPEED, velocity_begin
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import CONSTANT, RADIUS, TABLE, System, Work
 from railsim.kernels.time_loop import FAST
@@ -84,7 +84,8 @@ def start_state(
 ) -> tuple[Floats, int]:
     """State of the undisturbed vehicle at time 0 and exactly at `start`, and the steps before it.
 
-    The state is float64[n_state]; the steps are those of `approach`, over the track as it is.
+    The state is float64[n_state], with what the scheme remembers of the way, if that goes on in the
+    run; the steps are those of `approach`, over the track as it is.
 
     `start`: arc length of the reference body [m]; `step`, `scheme`: time step [s] and scheme of the
     run; `progress`: called repeatedly with the time simulated so far and the time to simulate [s];
@@ -127,6 +128,9 @@ def start_state(
         state[-3:] = 0.0, start, speed
         if model.wheels.uneven:
             follow_wheels(model, state, track.rail_base)
+        pushed = len(model.system.loads.body) + len(model.system.drives.body)
+        if pushed or model.wheels.uneven:  # what the scheme remembers of the way was without them
+            state[LAST_STEP] = 0.0
         return state
 
     steps = approach(model, track, start, speed, step)

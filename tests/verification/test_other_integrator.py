@@ -50,9 +50,10 @@ def wheel_forces(model, start, times):
 
 @points("support", ["rigid", "co-running"], always=(0,))
 def test_wheel_forces_on_irregular_rails_are_those_of_lsoda(support):
-    """Within 1.5e-3 of the wheel load at 25 m/s, with the chosen step of 1.67 or 2.5 ms.
+    """Within 3e-4 of the wheel load at 25 m/s, with the chosen step of 1.67 or 2.5 ms.
 
-    In the first 20 ms, in which the smoothed accelerations begin; later on it is 3e-4.
+    From the first step on: smoothed accelerations go on as they were at the end of the run-in.  On
+    rigid rails it was 1.1e-3 where they began anew.
     """
     coach = railsim.load_vehicle("coach_manchester")
     rough = {"type": "random", "spectrum": "erri_b176_low", "seed": 4}
@@ -65,4 +66,4 @@ def test_wheel_forces_on_irregular_rails_are_those_of_lsoda(support):
     load = result.Q0.mean()
     assert np.ptp(Q, axis=0).max() > 0.01 * load
     for forces, expected in ((result.Q, Q), (result.Y, Y)):
-        np.testing.assert_allclose(forces, expected, rtol=0.0, atol=1.5e-3 * load)
+        np.testing.assert_allclose(forces, expected, rtol=0.0, atol=3e-4 * load)
