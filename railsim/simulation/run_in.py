@@ -128,9 +128,9 @@ def start_state(
         state[-3:] = 0.0, start, speed
         if model.wheels.uneven:
             follow_wheels(model, state, track.rail_base)
-        pushed = len(model.system.loads.body) + len(model.system.drives.body)
-        if pushed or model.wheels.uneven:  # what the scheme remembers of the way was without them
-            state[LAST_STEP] = 0.0
+        pushed = model.system.loads, model.system.drives, model.system.actuators
+        if model.wheels.uneven or any(len(part.body) for part in pushed):
+            state[LAST_STEP] = 0.0  # what the scheme remembers of the way was without them
         return state
 
     steps = approach(model, track, start, speed, step)
