@@ -184,17 +184,11 @@ def _least(
     """Return the coordinates with the least sum of squares, and whether the search has settled."""
     from scipy.optimize import least_squares
 
-    def vector(z: Floats) -> Floats:
-        return problem.tried(z - 1.0)
-
-    def jacobian(z: Floats) -> Floats:
-        return problem.derivatives_near(z - 1.0)
-
     # about 1, so that the first region of trust has the size of the parameters
     found = least_squares(
-        vector,
+        lambda z: problem.tried(z - 1.0),
         1.0 + np.clip(x, bounds[0] + 1e-9, bounds[1] - 1e-9),
-        jacobian,
+        lambda z: problem.derivatives_near(z - 1.0),
         tuple(1.0 + bounds),
         method="trf",
         ftol=tolerance,
@@ -245,8 +239,7 @@ def _covariance(problem: Problem, x: Floats, jacobian: Floats, loss: str) -> tup
     jacobian = np.sqrt(counting)[:, None] * jacobian
     square = float(counting[:data] @ vector[:data] ** 2)
     square /= max(1.0, float(np.sum(counting[:data])) - problem.size)
-    # what the noise that is stated does not explain is taken as noise too
-    inflation = max(1.0, square)
+    inflation = max(1.0, square)  # what the noise that is stated does not explain is noise too
     _, singular, right = np.linalg.svd(jacobian, full_matrices=False)
     with np.errstate(divide="ignore"):
         inverse = np.where(singular > 1e-10 * singular[0], 1.0 / singular, 1e6)

@@ -130,24 +130,19 @@ class Identified:
         return np.asarray(self.covariance / np.outer(scale, scale))
 
     @cached_property
-    def _values(self) -> dict[str, Any]:
-        """Return the identified values by key of the vehicle."""
+    def values(self) -> Mapping[str, Any]:
+        """Identified values by the whole keys of the vehicle's file [SI]."""
         found = {}
         for parameter, factor in zip(self.parameters, self.factors, strict=True):
             for key in parameter.of_vehicle:
                 path, value = present(self.vehicle, key)
                 found[".".join(path)] = scaled(value, float(factor))
-        return found
-
-    @property
-    def values(self) -> Mapping[str, Any]:
-        """Identified values by the whole keys of the vehicle's file [SI]."""
-        return FrozenDict(self._values)
+        return FrozenDict(found)
 
     @property
     def fitted(self) -> Vehicle:
         """The vehicle with the identified values."""
-        return self.vehicle.with_values(self._values) if self._values else self.vehicle
+        return self.vehicle.with_values(self.values) if self.values else self.vehicle
 
     @property
     def unidentified(self) -> tuple[str, ...]:
@@ -191,7 +186,7 @@ class Identified:
         """Return the identified value of a parameter of one number."""
         if not parameter.keys or parameter.keys[0].startswith(TRACK):
             return None
-        value = self._values[".".join(present(self.vehicle, parameter.keys[0])[0])]
+        value = self.values[".".join(present(self.vehicle, parameter.keys[0])[0])]
         return None if isinstance(value, list) else float(value)
 
     def _misfit(self, one: Channel, simulated: Floats) -> float:
@@ -220,7 +215,7 @@ class Identified:
                     self.parameters, self.factors, self.deviations, self.intervals, strict=True
                 )
             ],
-            "values": dict(self._values),
+            "values": dict(self.values),
             **{name: getattr(self, name).tolist() for name in arrays},
             "unidentified": list(self.unidentified),
             "channels": [
@@ -294,8 +289,8 @@ class Identified:
         known = Path(base)
         if known.suffix == ".toml":
             base = relative(known.resolve(), path.resolve().parent)
-        lines = [*head, f"extends = {tomli_w.dumps({'x': str(base)})[4:].strip()}", ""]
-        lines.insert(len(head), 'format = "railsim-vehicle/1"')
+        extended = tomli_w.dumps({"extends": str(base)}).strip()
+        lines = [*head, 'format = "railsim-vehicle/1"', extended, ""]
         tables: dict[str, list[str]] = {}
         for parameter, spread in zip(self.parameters, self.deviations, strict=True):
             for key in parameter.of_vehicle:

@@ -269,8 +269,13 @@ class Problem:
             run = self.placed(x)[k].run
             tasks.append((run.simulated, (self.model, self.parameters, x[: self.count], slope)))
         for number, outcome in zip(missing, self.workers.run(tasks), strict=True):
-            found[number] = outcome
-            self._keep(*wanted[number], outcome)
+            while len(self._last) >= 3 * (self.count + 2) * len(self.runs):
+                del self._last[next(iter(self._last))]
+            name = self._name(*wanted[number])
+            found[number] = self._last[name] = outcome
+            if self.folder is not None:
+                with whole_file(self.folder / f"{name}.bin") as partial:
+                    partial.write_bytes(np.ascontiguousarray(outcome).tobytes())
         self.simulations += len(missing)
         if missing:
             self.progress(self.simulations)
@@ -294,12 +299,3 @@ class Problem:
         if len(data) != 8 * shape[0] * shape[1]:
             return None
         return np.frombuffer(data, dtype=np.float64).reshape(shape)
-
-    def _keep(self, x: Floats, k: int, slope: bool, values: Floats) -> None:
-        while len(self._last) >= 3 * (self.count + 2) * len(self.runs):
-            del self._last[next(iter(self._last))]
-        name = self._name(x, k, slope)
-        self._last[name] = values
-        if self.folder is not None:
-            with whole_file(self.folder / f"{name}.bin") as partial:
-                partial.write_bytes(np.ascontiguousarray(values).tobytes())

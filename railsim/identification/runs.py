@@ -216,12 +216,8 @@ def prepared(
         raise input_error(measurement.name, found, allowed, key="band")
     outputs = outputs_for(compared(measurement).values())
     constant = _constant(thinner)
-    measurement = measurement.with_remarks(
-        *(
-            f"{name} does not change where runs are compared: a dead sensor? It is left out."
-            for name in constant
-        )
-    )
+    dead = "does not change where runs are compared: a dead sensor? It is left out."
+    measurement = measurement.with_remarks(*(f"{name} {dead}" for name in constant))
     names = tuple(name for name in compared(measurement) if name not in constant)
     channels = tuple(measurement.definition.channels[name] for name in names)
     how: dict[str, Any] = {"output_rate": OVERSAMPLED * high, "outputs": outputs}

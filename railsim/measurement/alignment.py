@@ -5,6 +5,7 @@ the largest cross-correlation, between its grid points by a parabola, and a line
 shifts of all windows gives the whole shift and the drift of the mileage.
 """
 
+import fnmatch
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -137,12 +138,8 @@ def aligned(
         reference, at = Alignment(track).curvature(grid), s
         words = "curvature"
     else:
-        boxes = (
-            quantity
-            for quantity in measurement.quantities.values()
-            if quantity.startswith("sensor_acceleration:axlebox_1") and quantity.endswith(":z")
-        )
-        box, moved = next(boxes, None), displacement(track)
+        boxes = fnmatch.filter(measurement.quantities.values(), "sensor_acceleration:axlebox_1*:z")
+        box, moved = next(iter(boxes), None), displacement(track)
         if box is None or moved is None:
             allowed = (
                 "a channel of curvature, yaw_rate or axlebox_1's vertical acceleration with "
@@ -151,7 +148,12 @@ def aligned(
             raise argument_error("track", "nothing to align by", allowed)
         level = moved(grid)[0][[1, 3]].mean(axis=0)
         reference = np.gradient(np.gradient(level, STEP), STEP)
-        at = s + _ahead(measurement, vehicle, box.split(":")[1])
+        named = vehicle or measurement.definition.vehicle
+        if named is None:
+            allowed = "give it, or the key 'vehicle' of the measurement"
+            raise argument_error("vehicle", "none", allowed)
+        carrying = named if isinstance(named, Vehicle) else load_vehicle(named)
+        at = s + all_sensors(carrying)[box.split(":")[1]].along
         x = measurement[box] / np.maximum(measurement.speed, 1.0) ** 2
         step = float(np.mean(np.diff(s)))
         known = np.isfinite(x)
@@ -173,14 +175,3 @@ def aligned(
         f"{1e3 * found.stretch:+.2f} m/km (correlation {found.correlation:.2f} in "
         f"{found.windows} windows).{jumps}"
     )
-
-
-def _ahead(measurement: Measurement, vehicle: Vehicle | None, point: str) -> float:
-    """Return how far a sensor is ahead of the reference body [m]."""
-    if vehicle is None:
-        name = measurement.definition.vehicle
-        if name is None:
-            allowed = "give it, or the key 'vehicle' of the measurement"
-            raise argument_error("vehicle", "none", allowed)
-        vehicle = load_vehicle(name)
-    return all_sensors(vehicle)[point].along

@@ -137,14 +137,8 @@ def delayed(x: Floats, steps: float) -> Floats:
         weights = {0: 1.0}
     found = np.zeros(len(x))
     for k, weight in weights.items():
-        found += weight * _from_later(x, whole + k)
-    return found
-
-
-def _from_later(x: Floats, steps: int) -> Floats:
-    found = np.full(len(x), np.nan)
-    if abs(steps) < len(x):
-        found[max(0, -steps) : len(x) - max(0, steps)] = x[max(0, steps) : len(x) + min(0, steps)]
+        at = np.arange(len(x)) + whole + k
+        found += weight * np.where((at >= 0) & (at < len(x)), x.take(at, mode="clip"), np.nan)
     return found
 
 

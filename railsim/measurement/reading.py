@@ -54,7 +54,11 @@ def load_measurement(
         not rise, values that no vehicle reaches.
     """
     source = sources.read_source(sources.find_file(path, "measurement"), "measurement")
-    _beside(source)
+    folder = Path(source.file).parent
+    for key in ("vehicle", "track"):  # names of files beside the measurement count from its folder
+        name = source.data.get(key)
+        if isinstance(name, str) and name and (folder / name).is_file():
+            source.data[key] = str((folder / name).resolve())
     how = loaded(MeasurementFile, source, overrides)
     wanted = _wanted(str(path), how, channels)
     parts = _read(how, wanted)
@@ -85,15 +89,6 @@ def load_measurement(
             faults += _implausible(how, name, values[name])
     faults.check()
     return _measurement(str(path), how, clock, values, remarks)
-
-
-def _beside(source: sources.Source) -> None:
-    """Names of vehicle and track files beside the measurement count from its folder."""
-    folder = Path(source.file).parent
-    for key in ("vehicle", "track"):
-        name = source.data.get(key)
-        if isinstance(name, str) and name and (folder / name).is_file():
-            source.data[key] = str((folder / name).resolve())
 
 
 def _wanted(file: str, how: MeasurementFile, asked: Sequence[str] | None) -> list[str]:
