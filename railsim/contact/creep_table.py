@@ -184,15 +184,14 @@ def node_row(ratio: float, i_theta: int) -> tuple[Floats, int]:
     return row, failures
 
 
-def _stored_row(folder: Path, i_ratio: int, i_theta: int) -> tuple[Path, int]:
+def _stored_row(folder: Path, i_ratio: int, i_theta: int) -> None:
     path = folder / f"row_{i_ratio:02d}_{i_theta:02d}.npz"
-    row, failures = node_row(float(node_ratios()[i_ratio]), i_theta)
-    kalker = linear_coefficients(float(node_ratios()[i_ratio]))
+    ratio = float(node_ratios()[i_ratio])
+    row, failures = node_row(ratio, i_theta)
     part = path.with_suffix(".part")
     with open(part, "wb") as stream:
-        np.savez(stream, row=row, kalker=np.array(kalker), failures=failures)
+        np.savez(stream, row=row, kalker=linear_coefficients(ratio), failures=failures)
     part.rename(path)
-    return path, failures
 
 
 def build_nodes(folder: Path, workers: int = 2) -> Iterator[tuple[int, int]]:
@@ -289,24 +288,17 @@ def table_of_nodes(nodes: CreepNodes, nu: float = POISSON) -> CreepTable:
 
 def _free_spline(n: int) -> Floats:
     """Coefficients -1..n+1 from values at 0..n; third derivative continuous at 1 and n - 1."""
-    matrix, values = np.zeros((n + 3, n + 3)), np.zeros((n + 3, n + 1))
+    matrix = np.zeros((n + 3, n + 3))
     for i in range(n + 1):
         matrix[i, i : i + 3] = 1 / 6, 4 / 6, 1 / 6
-        values[i, i] = 1.0
     matrix[n + 1, :5] = matrix[n + 2, n - 2 :] = 1.0, -4.0, 6.0, -4.0, 1.0
-    return np.asarray(np.linalg.solve(matrix, values))
+    return np.asarray(np.linalg.solve(matrix, np.eye(n + 3, n + 1)))
 
 
 def _parity_spline(n: int, first: int, last: int) -> Floats:
     """Coefficients -1..n+1 from values at 0..n, even (1) or odd (-1) about the ends."""
-
-    def folded(k: int) -> tuple[int, int]:
-        return (-k, first) if k < 0 else ((2 * n - k, last) if k > n else (k, 1))
-
-    spread = np.zeros((n + 3, n + 1))
-    for k in range(-1, n + 2):
-        index, sign = folded(k)
-        spread[k + 1, index] += sign
+    spread: Floats = np.eye(n + 3, n + 1, -1)
+    spread[0, 1], spread[-1, -2] = first, last
     matrix = (spread[:-2] + 4.0 * spread[1:-1] + spread[2:]) / 6.0
     odd = [end for end, parity in ((0, first), (n, last)) if parity < 0]
     matrix[odd] = np.eye(n + 1)[odd]
@@ -319,8 +311,7 @@ def _parity_spline(n: int, first: int, last: int) -> Floats:
 
 def _periodic_spline(n: int, sign: int) -> Floats:
     """Coefficients -1..n+1 from values at 0..n-1 where f(k + n) = sign f(k)."""
-    spread = np.zeros((n + 3, n))
-    for k in range(-1, n + 2):
-        spread[k + 1, k % n] = 1 if 0 <= k < n else sign
+    spread: Floats = np.eye(n + 3, n, -1)
+    spread[0, -1] = spread[-2, 0] = spread[-1, 1] = sign
     matrix = (spread[:-3] + 4.0 * spread[1:-2] + spread[2:-1]) / 6.0
     return np.asarray(spread @ np.linalg.inv(matrix))

@@ -105,8 +105,7 @@ def loaded_contact(table: ContactTable, y: float, roll: float, load: float) -> L
 
     def vertical(z: float) -> Floats:
         e = np.maximum(approaches(z), 0.0)
-        force: Floats = e**1.5 * (fields[:, kernel.K] + fields[:, kernel.K2] * np.sqrt(e))
-        return force
+        return np.asarray(e**1.5 * (fields[:, kernel.K] + fields[:, kernel.K2] * np.sqrt(e)))
 
     lowest = float(fields[:, 0].min())
     depth = 1e-5

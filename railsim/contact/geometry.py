@@ -24,6 +24,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.tables import Wheelset
 from railsim.errors import Faults, InputError
 from railsim.kernels import contact_geometry as kernel
+from railsim.notation import SIDES
 from railsim.profiles.profile import Profile
 
 T = TypeVar("T")
@@ -89,12 +90,9 @@ class ContactGeometry:
         list of (lateral [m], side)
             Middle of the step in which the jump lies, and ``"left"`` or ``"right"``.
         """
-        found = []
-        for side, name in enumerate(("left", "right")):
-            step = np.abs(np.diff(self.wheel_y[:, side]))
-            for i in np.flatnonzero(step > least):
-                found.append((float(0.5 * (self.lateral[i] + self.lateral[i + 1])), name))
-        return sorted(found)
+        middles = 0.5 * (self.lateral[:-1] + self.lateral[1:])
+        steps = np.argwhere(np.abs(np.diff(self.wheel_y, axis=0)) > least)
+        return sorted((float(middles[i]), SIDES[side]) for i, side in steps)
 
 
 def _positions(furthest: float) -> Floats:
@@ -152,14 +150,12 @@ def contact_geometry(
         for w, r in zip(_pair(wheel), radii, strict=True)
     ]
     rails = [rail_curve(r, gauge, inclination) for r in _pair(rail)]
-    displacements = (
-        _positions(LATERAL)
-        if lateral is None
-        else np.atleast_1d(np.asarray(lateral, dtype=np.float64))
-    )
+    if lateral is None:
+        lateral = _positions(LATERAL)
+    displacements: Floats = np.atleast_1d(np.asarray(lateral, dtype=np.float64))
     Faults(
         fault
-        for side, w, r in zip(("left", "right"), wheels, rails, strict=True)
+        for side, w, r in zip(SIDES, wheels, rails, strict=True)
         for fault in misfits(w, r, gauge, f"{side} wheel")
     ).check()
     mean_radius = 0.5 * (radii[0] + radii[1])
