@@ -3,7 +3,7 @@
 Each irregularity says itself how it moves the rails, see `railsim.definitions.excitations`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -120,7 +120,7 @@ def measured_remarks(track: Track) -> list[str]:
                 f"{column} reaches {1e3 * between:.3g} mm at s = {s:.1f} m, "
                 f"the largest row is {1e3 * at_rows:.3g} mm."
             )
-        remarks += _size_remarks(part, index) + _gap_remarks(part, index)
+        remarks += [*_size_remarks(part, index), *_gap_remarks(part, index)]
         if (cell := track.length / MOST_ROWS) > part.resolution():
             remarks.append(
                 f"irregularities.{index} has rows closer than a track of {track.length:g} m is "
@@ -141,37 +141,35 @@ def measured_remarks(track: Track) -> list[str]:
     return remarks
 
 
-def _size_remarks(part: Measured, index: int) -> list[str]:
+def _size_remarks(part: Measured, index: int) -> Iterator[str]:
     """Remark on a record smaller than that of any track, unless its rows follow short waves."""
-    rows = np.array(part.rows or ())
-    largest = abs(part.scale) * float(np.abs(rows[:, 1:]).max())
-    if len(rows) < RECORDED or largest >= SMALLEST or np.median(np.diff(rows[:, 0])) < ROUGHNESS:
-        return []
-    return [
-        f"irregularities.{index} moves the rails by {1e3 * largest:.2g} mm at most, less than any "
-        "track does: another unit?"
-    ]
+    s, *rails = np.array(part.rows or ()).T
+    largest = abs(part.scale) * float(np.abs(rails).max())
+    if len(s) >= RECORDED and largest < SMALLEST and np.median(np.diff(s)) >= ROUGHNESS:
+        yield (
+            f"irregularities.{index} moves the rails by {1e3 * largest:.2g} mm at most, less than "
+            "any track does: another unit?"
+        )
 
 
-def _gap_remarks(part: Measured, index: int) -> list[str]:
+def _gap_remarks(part: Measured, index: int) -> Iterator[str]:
     """Remark on rows that are missing: a smooth curve bridges them, and no defect is seen there."""
     if not (gaps := part.gaps()):
-        return []
+        return
     s = np.array([row[0] + part.shift for row in part.rows or ()])
     k = max(gaps, key=lambda k: s[k] - s[k - 1])
     more = f"the longest of {len(gaps)} such gaps, " if len(gaps) > 1 else ""
-    return [
+    yield (
         f"irregularities.{index} has no rows from s = {s[k - 1]:.1f} to {s[k]:.1f} m, {more}"
         f"elsewhere one every {np.median(np.diff(s)):.3g} m: a smooth curve bridges them, and "
         "forces there are not those of the track."
-    ]
+    )
 
 
-def _held_remarks(part: Measured, index: int, track: Track) -> list[str]:
+def _held_remarks(part: Measured, index: int, track: Track) -> Iterator[str]:
     """Remark on a cross level or an alignment that holds the cant or the curves of the track."""
     rows = np.array(part.rows or ())
     s, rails = rows[:, 0] + part.shift, part.scale * rows[:, 1:]
-    remarks = []
     for word, sections, values in (
         ("cross level", cant_sections(track), rails[:, 3] - rails[:, 1]),
         ("alignment", curvature_sections(track), max(rails[:, 0], rails[:, 2], key=np.ptp)),
@@ -188,12 +186,11 @@ def _held_remarks(part: Measured, index: int, track: Track) -> list[str]:
                 there, same = f"where the track has {1e3 * own:.0f} mm of cant", "the same cant"
             else:
                 continue
-            remarks.append(
+            yield (
                 f"The {word} of irregularities.{index} is {1e3 * mean:.0f} mm in the mean about "
                 f"s = {middle:.0f} m, {there}: they add up. Where it is {same}, band takes it out."
             )
             break
-    return remarks
 
 
 def _widening(track: Track) -> Displacement:
