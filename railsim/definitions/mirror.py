@@ -9,7 +9,7 @@ from collections.abc import Set
 from typing import Any, TypeVar
 
 from railsim.definitions.base import OTHER_SIDE, Definition, Vector
-from railsim.definitions.elements.base import Element
+from railsim.definitions.elements.base import Element, times
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import groups
@@ -131,17 +131,13 @@ def _along(part: Part) -> Part:
 
 def _reflected(part: Part, signs: Vector) -> Part:
     """Return a part with its points and directions reflected, what is in it left alone."""
-
-    def at(point: Vector) -> Vector:
-        return (signs[0] * point[0], signs[1] * point[1], signs[2] * point[2])
-
     update: dict[str, Any] = {}
     for name, value in part:
         match name, value:
             case ("position" | "point", tuple()):
-                update[name] = at(value)
+                update[name] = times(value, signs)
             case ("points", tuple()):
-                update[name] = tuple(map(at, value))
+                update[name] = tuple(times(point, signs) for point in value)
     directed = part.mirrored(signs) if isinstance(part, Element) else part
     return directed.model_copy(update=update)
 

@@ -5,8 +5,13 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field
 
 from railsim.definitions.base import Finite, NonNegative, Positive, check, rises
-from railsim.definitions.elements.base import PairElement
+from railsim.definitions.elements.base import Element, PairElement
 from railsim.definitions.elements.rows import Drive
+
+
+def is_about_axle(element: Element) -> bool:
+    """Whether it is a torque about an axle, of a drive, brake or actuator, which holds nothing."""
+    return isinstance(element, AxleTorque) or getattr(element, "acts", None) == "axle"
 
 
 class AxleTorque(PairElement):

@@ -6,7 +6,7 @@ z_right; y to the right, z down) [m] and their derivatives along the track [1].
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self, get_args
 
 import numpy as np
 from pydantic import Field
@@ -19,7 +19,8 @@ Displacement = Callable[[Floats], tuple[Floats, Floats]]
 # Names of the columns of a measured irregularity, beside the arc length.
 COLUMNS = ("y_left", "z_left", "y_right", "z_right")
 # The four irregularities of a track.
-CHANNELS = ("lateral", "vertical", "cross_level", "gauge")
+Channel = Literal["lateral", "vertical", "cross_level", "gauge"]
+CHANNELS: tuple[Channel, ...] = get_args(Channel)
 # Sign of each in the mirror image of the track.
 MIRROR = {"lateral": -1.0, "vertical": 1.0, "cross_level": -1.0, "gauge": 1.0}
 # Rails moved by one unit of each: y_left, z_left, y_right, z_right; the cross level is an angle
@@ -30,7 +31,6 @@ SHARES = {
     "cross_level": (0.0, -1.0, 0.0, 1.0),
     "gauge": (-0.5, 0.0, 0.5, 0.0),
 }
-Channel = Literal["lateral", "vertical", "cross_level", "gauge"]
 Amplitude = Annotated[Finite, Field(ge=-0.5, le=0.5)]
 
 

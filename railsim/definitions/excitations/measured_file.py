@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from railsim.arrays import Floats
 from railsim.definitions.embedding import embed, tables_of
+from railsim.definitions.excitations.base import CHANNELS, COLUMNS, rails_moved
 from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.excitations.recording import BANDS, band_passed, equal_step, from_chord
 from railsim.errors import Fault, Faults, changed_faults, counted, input_error, nearest
@@ -21,16 +22,9 @@ from railsim.files.access import TABLE_BYTES, read_bytes
 
 UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3, "_in": 0.0254, "_ft": 0.3048}
 # what a column adds to s, y_left, z_left, y_right, z_right
-SHARES = {
-    "s": (1.0, 0.0, 0.0, 0.0, 0.0),
-    "y_left": (0.0, 1.0, 0.0, 0.0, 0.0),
-    "z_left": (0.0, 0.0, 1.0, 0.0, 0.0),
-    "y_right": (0.0, 0.0, 0.0, 1.0, 0.0),
-    "z_right": (0.0, 0.0, 0.0, 0.0, 1.0),
-    "y": (0.0, 1.0, 0.0, 1.0, 0.0),
-    "z": (0.0, 0.0, 1.0, 0.0, 1.0),
-    "cross_level": (0.0, 0.0, -0.5, 0.0, 0.5),
-    "gauge": (0.0, -0.5, 0.0, 0.5, 0.0),
+SHARES: dict[str, Floats] = dict(zip(("s", *COLUMNS), np.eye(5), strict=True)) | {
+    name: np.append(0.0, rails_moved(channel))
+    for name, channel in zip(("y", "z", "cross_level", "gauge"), CHANNELS, strict=True)
 }
 # columns of single rails and of the track, of which a file has the ones or the others: they add up
 EITHER = ({"y_left", "y_right"}, {"y", "gauge"}), ({"z_left", "z_right"}, {"z", "cross_level"})

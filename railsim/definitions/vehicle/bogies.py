@@ -3,8 +3,8 @@
 from collections import defaultdict
 from collections.abc import Mapping, Set
 
-from railsim.definitions.elements.traction import AxleTorque
-from railsim.definitions.vehicle.flatten import FlatBody, FlatElement, FlatVehicle
+from railsim.definitions.elements.traction import is_about_axle
+from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle
 
 NEAR = 3.0  # a frame lies no further from its wheelset than this along the vehicle [m]
 
@@ -74,7 +74,8 @@ def carrying(flat: FlatVehicle) -> tuple[FlatBody, ...]:
 def _between(flat: FlatVehicle, wheelset: str) -> Set[str]:
     """Names of the bodies on the shortest ways from a wheelset to the reference body."""
     joined: dict[str, set[str]] = defaultdict(set)
-    ends = [(e.body1, e.body2) for e in flat.elements if e.body2 and not _about_axle(e)]
+    holding = [e for e in flat.elements if e.body2 and not is_about_axle(e.definition)]
+    ends = [(e.body1, e.body2) for e in holding]
     ends += [(body.name, body.parent) for body in flat.bodies if body.parent]
     for one, other in ends:
         joined[one].add(other)
@@ -92,9 +93,3 @@ def _steps(joined: Mapping[str, Set[str]], begin: str) -> dict[str, int]:
         edge = {name for one in edge for name in joined.get(one, ())} - found.keys()
         found |= dict.fromkeys(edge, max(found.values()) + 1)
     return found
-
-
-def _about_axle(element: FlatElement) -> bool:
-    """Whether it is a torque of a drive or brake, which holds nothing."""
-    law = element.definition
-    return isinstance(law, AxleTorque) or getattr(law, "acts", None) == "axle"

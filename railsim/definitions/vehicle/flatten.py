@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from railsim.constants import GRAVITY
 from railsim.definitions.base import Vector, kept
 from railsim.definitions.elements.base import Element
-from railsim.definitions.elements.traction import AxleTorque
+from railsim.definitions.elements.traction import is_about_axle
 from railsim.definitions.vehicle.loads import load_faults, loaded
 from railsim.definitions.vehicle.names import name_faults, resolve, sided_names
 from railsim.definitions.vehicle.tables import Assembly, Placement, Wheelset
@@ -289,7 +289,7 @@ def _side_faults(group: Group, frame: _Frame) -> Iterator[Fault]:
 
 def _torque_faults(group: Group, frame: _Frame, kinds: Mapping[str, str]) -> Iterator[Fault]:
     for name, element in group.elements.items():
-        if not isinstance(element, AxleTorque) and getattr(element, "acts", "") != "axle":
+        if not is_about_axle(element):
             continue
         found = [kinds[resolve(body, frame.scope, None, kinds) or ""] for body in element.bodies]
         if found[0] == "wheelset" or found[1] != "wheelset":
