@@ -155,13 +155,10 @@ def _partners(
 
 def _ordered(modes: Eigenmodes, indices: Indices) -> Eigenmodes:
     """Modes of given indices, NaN where there is none (-1)."""
-    there = indices >= 0
-    size, n = len(indices), modes.shapes.shape[1]
-    values = np.full(size, complex(np.nan, np.nan))
-    shapes, left = np.full((2, size, n), np.nan, dtype=complex)
-    values[there] = modes.eigenvalues[indices[there]]
-    shapes[there], left[there] = modes.shapes[indices[there]], modes.left[indices[there]]
-    return Eigenmodes(modes.linearisation, values, shapes, left)
+    parts = (modes.eigenvalues, modes.shapes, modes.left)
+    nothing = complex(np.nan, np.nan)  # behind the last one, where -1 points to
+    found = (np.insert(part, len(part), nothing, axis=0)[indices] for part in parts)
+    return Eigenmodes(modes.linearisation, *found)
 
 
 def divergent(modes: Eigenmodes) -> Eigenmodes | None:

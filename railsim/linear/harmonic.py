@@ -45,7 +45,8 @@ class ContactPath:
         amplitude.
         """
         place = vehicle.coordinates.position_of
-        columns = np.array([[place[b, k] for k in (Y, Z, ROLL)] for b in _bodies(vehicle)])
+        bodies = vehicle.system.contact.body
+        columns = np.array([[place[b, k] for k in (Y, Z, ROLL)] for b in bodies])
         # sin(theta) has the same value at two angles of a quadrant's pair
         sines = np.sin(2.0 * np.pi * (np.arange(ANGLES // 4) + 0.5) / ANGLES)
         sines = np.concatenate([sines, -sines])
@@ -103,11 +104,7 @@ class ContactPath:
         raise ModelError("no contact path")
 
 
-def _bodies(vehicle: FreeVehicle) -> list[int]:
-    return [int(body) for body in vehicle.system.contact.body]
-
-
 def _forces(vehicle: FreeVehicle, x: Floats) -> Floats:
     """Vertical force and roll moment that the rails give each wheelset, float64[wheelset, 2]."""
     vehicle.rate(x)
-    return np.asarray(vehicle.work.rail_force[np.ix_(_bodies(vehicle), [2, 3])])
+    return np.asarray(vehicle.work.rail_force[vehicle.system.contact.body, 2:4])

@@ -15,7 +15,7 @@ from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
 from railsim.errors import argument_error, nearest, optional_package
 from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
-from railsim.linear.naming import Parts, apart, divergence, mode_name, parts_of
+from railsim.linear.naming import apart, divergence, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
 from railsim.plottable import Plottable
 from railsim.profiles import Profile
@@ -404,6 +404,7 @@ def _named(
     order = np.argsort(found.frequencies <= SLOWEST, kind="stable")
     names = numbered([mode_name(parts, found, k) if there[k] else "" for k in order])
     name_of = dict(zip(order, names, strict=True))
+    moving = [name.rstrip("'") for name in c.names[c.velocities]]
     listed = []
     for k, (value, shape) in enumerate(zip(found.eigenvalues, found.shapes, strict=True)):
         if np.isnan(value):
@@ -413,15 +414,10 @@ def _named(
         largest = positions[int(np.argmax(np.abs(positions)))]
         shown = (positions / largest if largest else positions).tolist()
         shapes = dict(zip(c.names[: c.n_positions], shown, strict=True))
-        listed.append(Mode(name_of[k], complex(value), _participation(parts, shape), shapes))
+        energy = parts.energy_shares(shape)[c.bodies[c.velocities], c.components[c.velocities]]
+        largest_first = np.argsort(-energy, kind="stable")
+        shares = {moving[j]: float(energy[j]) for j in largest_first if energy[j] >= LEAST_SHARE}
+        listed.append(Mode(name_of[k], complex(value), shares, shapes))
     remarks = (*prepared.remarks, *divergence(parts, found))
     about = remarks, parameter, prepared.name, prepared.place
     return Modes(speed, prepared.contact, tuple(listed), *about)
-
-
-def _participation(parts: Parts, shape: Complexes) -> dict[str, float]:
-    c, shares = parts.coordinates, parts.energy_shares(shape)
-    names = [name.rstrip("'") for name in c.names[c.velocities]]
-    values = shares[c.bodies[c.velocities], c.components[c.velocities]]
-    order = np.argsort(-values, kind="stable")
-    return {names[k]: float(values[k]) for k in order if values[k] >= LEAST_SHARE}

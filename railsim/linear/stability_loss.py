@@ -47,7 +47,14 @@ def loss_of_stability(
     known: dict[float, float] = {}
 
     def modes(parameter: float) -> Eigenmodes:
-        return _least_damped(eigenmodes(at(parameter)), counts)
+        """The least damped oscillation searched, without undamped ones that do not count."""
+        found = eigenmodes(at(parameter))
+        inside = _searched(found.eigenvalues)
+        order = inside[np.argsort(-found.eigenvalues[inside].real)]
+        ordered = [found.taken([int(k)]) for k in order]
+        if counts is not None:
+            ordered = [m for m in ordered if m.eigenvalues[0].real < 0.0 or counts(m)] or ordered
+        return ordered[0]
 
     def growth(parameter: float) -> float:
         if parameter not in known:
@@ -110,20 +117,6 @@ def _beyond_zero(
         lambda x: -growth(x), bounds=(before, after), method="bounded", options={"maxiter": 12}
     )
     return float(found.x) if found.fun <= 0.0 else None
-
-
-def _least_damped(
-    modes: Eigenmodes, counts: Callable[[Eigenmodes], bool] | None = None
-) -> Eigenmodes:
-    """The mode of largest growth among the oscillations searched, if undamped one that counts.
-
-    Where no mode counts, the least damped of those that decay.
-    """
-    inside = _searched(modes.eigenvalues)
-    ordered = [modes.taken([int(k)]) for k in inside[np.argsort(-modes.eigenvalues[inside].real)]]
-    if counts is not None:
-        ordered = [m for m in ordered if m.eigenvalues[0].real < 0.0 or counts(m)] or ordered
-    return ordered[0]
 
 
 def _searched(eigenvalues: Complexes) -> Indices:

@@ -167,7 +167,11 @@ class LinearVehicle:
         self.sticking = int(np.count_nonzero(self.model.system.internal.kind == PAD))
         if self.sticking:
             self.remarks += (f"{self.sticking} friction elements stick: {STICKING}",)
-        _check_hold(self.model, hold)
+        kinds = zip(self.model.index.bodies, self.model.system.bodies.kind, strict=True)
+        rigid = [name for name, kind in kinds if kind in (RIGID, FIXED)]
+        if wrong := [name for name in hold if name not in rigid]:
+            found = "no such body; `held` holds the wheelsets"
+            raise argument_error("hold", found, ", ".join(rigid), key=wrong[0])
         self.hold = tuple(hold)
         self.coordinates: Coordinates = coordinates(self.model, held=held, hold=hold)
         if not self.coordinates.n_velocities:
@@ -228,16 +232,6 @@ class LinearVehicle:
         if path is not None:
             matrix = path.matrix(vehicle, matrix)
         return vehicle.linearisation(matrix)
-
-
-def _check_hold(model: Model, hold: Sequence[str]) -> None:
-    """Refuse to hold parts that are not bodies."""
-    kinds = zip(model.index.bodies, model.system.bodies.kind, strict=True)
-    rigid = [name for name, kind in kinds if kind in (RIGID, FIXED)]
-    wrong = [name for name in hold if name not in rigid]
-    if wrong:
-        found = "no such body; `held` holds the wheelsets"
-        raise argument_error("hold", found, ", ".join(rigid), key=wrong[0])
 
 
 def on_cones(vehicle: Vehicle, conicity: float) -> tuple[Vehicle, Profile]:

@@ -76,8 +76,10 @@ def followed_branches(
         tell = telling(number)
         tell(0.0)
         seed = next((p for p in piece if p.speed >= piece[0].speed + FROM_END), piece[-1])
-        lines = [branch.points for branch in found.branches]
-        if seed.amplitude < FIRST or _is_covered(seed, [*lines, *tried]):
+        lines = [*(branch.points for branch in found.branches), *tried]
+        passed = (amplitude for line in lines for amplitude, _ in _passed_at(line, seed.speed))
+        near = COVERED * seed.amplitude
+        if seed.amplitude < FIRST or any(abs(one - seed.amplitude) < near for one in passed):
             continue
         tried.append(piece)
         name = (
@@ -160,15 +162,6 @@ def _follow(
 
 def _point(motion: PeriodicMotion) -> Point:
     return Point(motion.speed, motion.amplitude, motion.frequency, stable=motion.is_stable)
-
-
-def _is_covered(point: Point, lines: Sequence[Sequence[Point]]) -> bool:
-    """Whether a line passes a motion."""
-    return any(
-        abs(amplitude - point.amplitude) < COVERED * point.amplitude
-        for line in lines
-        for amplitude, _ in _passed_at(line, point.speed)
-    )
 
 
 def _passed_at(line: Sequence[Point], speed: float) -> Iterator[tuple[float, float]]:

@@ -454,29 +454,20 @@ class _Search:
         Q, Y = wheel[:, :, W_Q], wheel[:, :, W_Y]
         with np.errstate(divide="ignore", invalid="ignore"):
             quotient = Y / Q * np.array([-1.0, 1.0])
+        patch = solver.work.patch[:, : solver.patches]
+        order = np.argsort(patch[NORMAL], kind="stable")  # of a wheel the most loaded one last
+        contact_y = np.full(Q.shape, np.nan)
+        contact_y[tuple(solver.work.patch_index[order, :2].T)] = patch[C_Y, order]
         return {
             "Q": Q,
             "Y": Y,
             "Y_over_Q": quotient,
             "dQ_over_Q0": (Q - self.Q0) / self.Q0,
             "T_gamma": wheel[:, :, W_T_GAMMA],
-            "contact_y": _contact_positions(solver, len(wheelsets)),
+            "contact_y": contact_y,
             "lateral": against_rails(self.model.system, state[None])[0, :, 0],
             "attack": state[6 * wheelsets + YAW],
             "sum_Y": Y.sum(axis=1),
             "steering": state[[6 * b + YAW for b in frames]],
             "car_roll": state[6 * self.parts.cars[0] + ROLL] if self.parts.cars else np.nan,
         }
-
-
-def _contact_positions(solver: SteadyRolling, wheelsets: int) -> Floats:
-    """Position of each wheel's most loaded patch from the wheelset's middle [m]."""
-    work = solver.work
-    found = np.full((wheelsets, 2), np.nan)
-    load = np.zeros((wheelsets, 2))
-    for k in range(solver.patches):
-        w, side, _ = work.patch_index[k]
-        if work.patch[NORMAL, k] > load[w, side]:
-            load[w, side] = work.patch[NORMAL, k]
-            found[w, side] = work.patch[C_Y, k]
-    return found

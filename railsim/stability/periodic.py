@@ -161,12 +161,9 @@ class Shooting:
         begin = np.array([state, state])
         ends = self._flow.after(begin, np.array([1e-2, 2e-2]) * period, np.full(2, speed))
         along = (ends[1] - ends[0]) / self._scale[:n]
-        slower = np.zeros(n + 2)
-        slower[-1] = -1.0
-        guess = PeriodicMotion(
-            state, period, speed, 0.0, np.zeros(0, complex), slower, along / np.linalg.norm(along)
-        )
-        return self.at_speed(guess, speed)
+        none, slower = np.zeros(0, complex), -np.eye(n + 2)[-1]
+        unit = along / np.linalg.norm(along)
+        return self.at_speed(PeriodicMotion(state, period, speed, 0.0, none, slower, unit), speed)
 
     def at_speed(self, near: PeriodicMotion, speed: float) -> PeriodicMotion:
         """Return the motion at a given speed [m/s] near to a known one.
@@ -175,9 +172,7 @@ class Shooting:
         far.
         """
         change = (speed - near.speed) / self._scale[-1]
-        direction = np.zeros(len(near.tangent))
-        direction[-1] = 1.0
-        return self._solved(near, direction, change)[0]
+        return self._solved(near, np.eye(len(near.tangent))[-1], change)[0]
 
     def _solved(
         self, now: PeriodicMotion, direction: Floats, length: float
@@ -279,9 +274,7 @@ class Shooting:
     def _motion(self, u: Floats, matrix: Floats, along: Floats, before: Floats) -> PeriodicMotion:
         """Return what was found at u; the tangent goes on in the sense of the one before."""
         n = len(u) - 2
-        right = np.zeros(n + 2)
-        right[-1] = 1.0
-        tangent = np.linalg.solve(np.vstack([matrix, along, before]), right)
+        tangent = np.linalg.solve(np.vstack([matrix, along, before]), np.eye(n + 2)[-1])
         state, period, speed = u[:n] * self._scale[:n], u[n] * self._scale[n], u[-1]
         speed = float(speed * self._scale[-1])
         multipliers = np.linalg.eigvals(matrix[:, :n] + np.eye(n)).astype(complex)
