@@ -6,6 +6,7 @@ and what the kernels read (arrays with indices).  `Index` keeps the way back.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -148,9 +149,12 @@ def assemble(
     """
     check_types([vehicle], track, settings=settings)
     flat = flatten(vehicle)
-    given = _profiles_by_name(profiles)
+    given = {} if profiles is None else profiles
+    if not isinstance(given, Mapping) or not all(isinstance(p, Profile) for p in given.values()):
+        raise TypeError("profiles: give a mapping of names to what railsim.load_profile returns")
     check_fixed(flat, track, settings.drive.mode)
-    make_table = make_table or _tables_made_once()
+    # no table is made twice, also where none is kept on disk
+    make_table = make_table or cache(cached_contact_table)
     contact, tables, used = _contact(flat, track, settings, given, make_table)
     contact = with_own_laws(contact, settings)
     if vehicle.laws:  # whose blocks the loop writes into: each model has its own
@@ -203,7 +207,7 @@ def _suspension(flat: FlatVehicle, laws: Mapping[str, Law] | None = None) -> tup
         **elements.arrays(),
     )
     return system, Index(
-        bodies=tuple(_names(flat.bodies)),
+        bodies=tuple(body.name for body in flat.bodies),
         wheelsets=tuple(body.name for body in flat.of_kind("wheelset")),
         links=tuple(row["name"] for row in elements.link_rows),
         mounts=tuple(row["name"] for row in elements.mount_rows),
@@ -254,13 +258,9 @@ def drive_arrays(drive: DriveDefinition) -> Drive:
     return CONSTANT_SPEED
 
 
-def _names(bodies: Sequence[FlatBody]) -> list[str]:
-    return [body.name for body in bodies]
-
-
 def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
     """Arrays of the bodies, and the arc length of each track frame from the reference body."""
-    names = _names(flat.bodies)
+    names = [body.name for body in flat.bodies]
     positions = [round(x, 9) for x in flat.along(flat.bodies)]
     offsets = sorted(set(positions))
     kinds = np.array([FIXED if b.fixed else _KINDS[b.kind] for b in flat.bodies], dtype=np.int64)
@@ -306,35 +306,11 @@ def side_by_side(tables: Sequence[Floats]) -> Floats:
     return values
 
 
-def _tables_made_once() -> Callable[..., ContactTable]:
-    """Return `cached_contact_table` that makes no table twice, also where there is no cache."""
-    made: dict[object, ContactTable] = {}
-
-    def table(wheel: Profile, rail: Profile, **how: Any) -> ContactTable:
-        key = wheel.key(), rail.key(), repr(how)
-        if key not in made:
-            made[key] = cached_contact_table(wheel, rail, **how)
-        return made[key]
-
-    return table
-
-
-def _profiles_by_name(profiles: Mapping[str, Profile] | None) -> dict[str, Profile]:
-    """Return the profiles of a call; TypeError where they are no mapping of names to profiles."""
-    if profiles is None:
-        return {}
-    if not isinstance(profiles, Mapping) or not all(
-        isinstance(profile, Profile) for profile in profiles.values()
-    ):
-        raise TypeError("profiles: give a mapping of names to what railsim.load_profile returns")
-    return dict(profiles)
-
-
 def _contact(
     flat: FlatVehicle,
     track: Track,
     settings: Settings,
-    profiles: dict[str, Profile],
+    profiles: Mapping[str, Profile],
     make_table: Callable[..., ContactTable],
 ) -> tuple[Contact, tuple[ContactTable, ...], dict[str, Profile]]:
     """Contact arrays, one table for each different wheel on its rail, and the profiles used."""
@@ -385,7 +361,7 @@ def _contact(
     first = tables[0]
     y0, values = on_common_grid(tables)
     falling = track.friction_falling
-    names = _names(flat.bodies)
+    names = [body.name for body in flat.bodies]
     weight = GRAVITY * sum(body.mass for body in flat.bodies)
     contact = Contact(
         body=np.array([names.index(body.name) for body in wheelsets], dtype=np.int64),

@@ -89,8 +89,14 @@ def equilibrium(model: Model, speed: float, inputs: str = "") -> Equilibrium:
                 _AT_REST.clear()
             _AT_REST[key] = rest
     model = with_these_preloads(model, rest.tension, rest.preload)
-    level = level_track(model.system)
-    rough = level._replace(track=_with_friction(level, model.system))
+    level, track = level_track(model.system), model.system.track
+    rail = level.track.rail.copy()
+    row = min(max(int(-track.s_start / track.ds), 0), len(track.rail) - 1)  # at s = 0
+    friction = track.rail[row, MU_LEFT : MU_RIGHT + 1, 0]
+    # without friction on one side alone nothing guides the wheelsets, and steady rolling is
+    # somewhere in the flange
+    rail[:, MU_LEFT : MU_RIGHT + 1, 0] = np.maximum(friction, ONE_SIDED * np.max(friction))
+    rough = level._replace(track=level.track._replace(rail=rail))
     rolling = _Balance(model, rough, speed=speed, rolling=True)
     return Equilibrium(model, rolling.solve(rest.state), rest.Q0, rolling.residual, rest.remarks)
 
@@ -168,19 +174,6 @@ def _released(model: Model) -> Model:
     bodies = bodies._replace(kind=kind, fixed=bodies.fixed[:0])
     design = None if model.design is None else _released(model.design)
     return replace(model, system=model.system._replace(bodies=bodies), design=design)
-
-
-def _with_friction(level: System, system: System):  # type: ignore[no-untyped-def]
-    """Level track with the friction that the real track has at s = 0.
-
-    A rail with next to none counts as a share of the other one: without friction on one side
-    alone nothing guides the wheelsets, and steady rolling is somewhere in the flange.
-    """
-    rail = level.track.rail.copy()
-    row = min(max(int(-system.track.s_start / system.track.ds), 0), len(system.track.rail) - 1)
-    friction = system.track.rail[row, MU_LEFT : MU_RIGHT + 1, 0]
-    rail[:, MU_LEFT : MU_RIGHT + 1, 0] = np.maximum(friction, ONE_SIDED * np.max(friction))
-    return level.track._replace(rail=rail)
 
 
 def _first_guess(model: Model, level: System) -> Floats:

@@ -21,7 +21,6 @@ from railsim.definitions.elements.friction import SideBearer
 from railsim.definitions.elements.springs import BumpStop, SpringDamper
 from railsim.definitions.track.check_rail import CheckRail
 from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
-from railsim.definitions.vehicle.tables import Service
 from railsim.errors import ModelError, listed
 
 if TYPE_CHECKING:
@@ -85,22 +84,19 @@ def vehicle_remarks(
 def _without_supports(vehicle: Vehicle) -> list[Remark]:
     flat, service = flatten(vehicle), vehicle.service
     points = {f"sensors.{name}": point.position for name, point in vehicle.sensors.items()}
+    found: list[Remark] = []
     if service is not None:
         points |= {f"service.points.{name}": at.position for name, at in service.points.items()}
         points["service.floor_height"] = (0.0, 0.0, -service.floor_height)
-    found = [*_admissible_speed(service), *_bodies(flat, points)]
-    found += [*_by_text(_far_from_axles(flat)), *_vertical_modes(flat)]
+        if (speed := service.admissible_speed) > FASTEST:
+            text = f"{speed:g} m/s are {3.6 * speed:.0f} km/h: is the speed in m/s?"
+            found.append(Remark("service.admissible_speed", text))
+    found += [*_bodies(flat, points), *_by_text(_far_from_axles(flat)), *_vertical_modes(flat)]
     found += [*_by_text(_pulling(flat)), *_by_text(_coefficients(flat))]
     for name in vehicle.loads:
         of_load = _bodies(flatten(vehicle.model_copy(update={"load": name})), points)
         found += [Remark(f"loads.{name}: {r.key}", r.text) for r in of_load if r not in found]
     return found
-
-
-def _admissible_speed(service: Service | None) -> Iterator[Remark]:
-    if service is not None and (speed := service.admissible_speed) > FASTEST:
-        text = f"{speed:g} m/s are {3.6 * speed:.0f} km/h: is the speed in m/s?"
-        yield Remark("service.admissible_speed", text)
 
 
 def _bodies(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> list[Remark]:

@@ -289,13 +289,9 @@ def _auto_preloads(model: Model, *, known_lengths: bool = False) -> dict[int, fl
 
 def _conditions(system: System) -> list[tuple[int, int]]:
     """(body, component) of every equation: z, roll, pitch of rigid bodies, pitch of axleboxes."""
-    rows: list[tuple[int, int]] = []
-    for body, kind in enumerate(system.bodies.kind):
-        if kind == RIGID:
-            rows += [(body, 2), (body, 3), (body, 4)]
-        elif kind == AXLEBOX:
-            rows.append((body, 4))
-    return rows
+    components = {RIGID: (2, 3, 4), AXLEBOX: (4,)}
+    kinds = enumerate(system.bodies.kind.tolist())
+    return [(body, axis) for body, kind in kinds for axis in components.get(kind, ())]
 
 
 def _preload_forces(
@@ -333,9 +329,8 @@ def _add(totals: Floats, body: int, lever: Floats, force: Floats) -> None:
 def _unbalanced(model: Model, conditions: list[tuple[int, int]], rest: Floats) -> list[str]:
     """What the preloads leave of forces and moments, in words."""
     weight = float(np.sum(model.system.bodies.mass)) * model.system.gravity
-    lines = []
-    for (body, component), value in zip(conditions, rest, strict=True):
-        if abs(value) > UNBALANCED * weight:
-            unit = "N" if component < 3 else "N m"
-            lines.append(f"{model.index.bodies[body]}: {COMPONENTS[component]} {value:.6g} {unit}")
-    return lines
+    return [
+        f"{model.index.bodies[body]}: {COMPONENTS[k]} {value:.6g} {'N' if k < 3 else 'N m'}"
+        for (body, k), value in zip(conditions, rest, strict=True)
+        if abs(value) > UNBALANCED * weight
+    ]

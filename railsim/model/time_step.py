@@ -292,20 +292,13 @@ class Stability:
         allowed = self._allowed.get(number, more)
         if SLIGHT / h < growth <= allowed:  # perhaps of a lower bound only
             growth = _step_growth(self._model, system, state, self._scheme, h, 0.0, implicit)
-        if growth <= allowed:
-            return True
-        return growth * h < SLIGHT and not self._helped_by_halving(system, state, h, growth)
-
-    def _helped_by_halving(self, system: System, state: Floats, h: float, growth: float) -> bool:
-        """Whether a shorter step has less growth.
-
-        A step that is too long has.  What does not: dry friction at the limit of sliding, where the
-        state has no derivative and its differences grow with 1/sqrt(h), whatever the step.
-        """
-        for part in (0.5, 0.25):
-            if _step_growth(self._model, system, state, self._scheme, part * h) < growth:
-                return True
-        return False
+        # a shorter step has less growth where a step is too long, not with dry friction at the
+        # limit of sliding: the state has no derivative, its differences grow with 1/sqrt(h)
+        how = self._model, system, state, self._scheme
+        return growth <= allowed or (
+            growth * h < SLIGHT
+            and not any(_step_growth(*how, part * h) < growth for part in (0.5, 0.25))
+        )
 
 
 def _vehicle_growth(model: Model, system: System, state: Floats) -> float:
