@@ -259,10 +259,6 @@ def store_file(path: Path, write: Callable[[int], None]) -> bool:
             "run prepares itself again"
         )
         return False
-    except BaseException:
-        if name is not None:
-            Path(name).unlink(missing_ok=True)
-        raise
     finally:
         if name is not None:
             with suppress(OSError):

@@ -40,6 +40,7 @@ from railsim.kernels.lanes import (
     load_rows,
     spread,
     square_root,
+    starts,
     store_lanes,
 )
 from railsim.kernels.system import FORCE, MOMENT, POSE_SIZE, PUSH
@@ -63,16 +64,9 @@ from railsim.kernels.vectors import (
 @compiled(inline=True)
 def end_of(body, end, which):
     """Where the rows in `Work.pose` of one end's bodies start, for eight elements."""
-    return (
-        body[which[0], end] * POSE_SIZE,
-        body[which[1], end] * POSE_SIZE,
-        body[which[2], end] * POSE_SIZE,
-        body[which[3], end] * POSE_SIZE,
-        body[which[4], end] * POSE_SIZE,
-        body[which[5], end] * POSE_SIZE,
-        body[which[6], end] * POSE_SIZE,
-        body[which[7], end] * POSE_SIZE,
-    )
+    a, b, c, d = body[which[0], end], body[which[1], end], body[which[2], end], body[which[3], end]
+    e, f, g, h = body[which[4], end], body[which[5], end], body[which[6], end], body[which[7], end]
+    return starts((a, b, c, d, e, f, g, h), POSE_SIZE)
 
 
 @compiled(inline=True)

@@ -352,35 +352,12 @@ def store_lanes(typingctx, array, offset, x):
 
 
 @compiled(inline=True)
-def eight(index, first):
-    """Eight entries of `index` from `first` on; beyond its end the last one again."""
-    last = index.shape[0] - 1
-    return (
-        index[min(first, last)],
-        index[min(first + 1, last)],
-        index[min(first + 2, last)],
-        index[min(first + 3, last)],
-        index[min(first + 4, last)],
-        index[min(first + 5, last)],
-        index[min(first + 6, last)],
-        index[min(first + 7, last)],
-    )
-
-
-@compiled(inline=True)
 def eight_from(first, count):
     """The numbers from `first` on; beyond `count` the last one again."""
     last = count - 1
-    return (
-        min(first, last),
-        min(first + 1, last),
-        min(first + 2, last),
-        min(first + 3, last),
-        min(first + 4, last),
-        min(first + 5, last),
-        min(first + 6, last),
-        min(first + 7, last),
-    )
+    a, b, c = min(first, last), min(first + 1, last), min(first + 2, last)
+    d, e, f = min(first + 3, last), min(first + 4, last), min(first + 5, last)
+    return a, b, c, d, e, f, min(first + 6, last), min(first + 7, last)
 
 
 @compiled(inline=True)
@@ -411,46 +388,28 @@ def eight_of_pairs(index, numbers):
 @compiled(inline=True)
 def second_on(rows, between):
     """The second of each pair of rows so much further on."""
-    return (
-        rows[0],
-        rows[1] + between,
-        rows[2],
-        rows[3] + between,
-        rows[4],
-        rows[5] + between,
-        rows[6],
-        rows[7] + between,
-    )
+    a, b, c, d, e, f, g, h = rows
+    return a, b + between, c, d + between, e, f + between, g, h + between
 
 
 @compiled(inline=True)
 def eight_of(index, numbers):
     """Entries of `index` at the eight `numbers`."""
-    return (
-        index[numbers[0]],
-        index[numbers[1]],
-        index[numbers[2]],
-        index[numbers[3]],
-        index[numbers[4]],
-        index[numbers[5]],
-        index[numbers[6]],
-        index[numbers[7]],
-    )
+    a, b, c, d, e, f, g, h = numbers
+    return index[a], index[b], index[c], index[d], index[e], index[f], index[g], index[h]
+
+
+@compiled(inline=True)
+def eight(index, first):
+    """Eight entries of `index` from `first` on; beyond its end the last one again."""
+    return eight_of(index, eight_from(first, index.shape[0]))
 
 
 @compiled(inline=True)
 def starts(numbers, size):
     """Where eight rows of a table with rows of `size` start."""
-    return (
-        numbers[0] * size,
-        numbers[1] * size,
-        numbers[2] * size,
-        numbers[3] * size,
-        numbers[4] * size,
-        numbers[5] * size,
-        numbers[6] * size,
-        numbers[7] * size,
-    )
+    a, b, c, d, e, f, g, h = numbers
+    return a * size, b * size, c * size, d * size, e * size, f * size, g * size, h * size
 
 
 if numba.config.DISABLE_JIT:

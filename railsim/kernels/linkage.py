@@ -140,18 +140,13 @@ def constraints(linkage, lane, arc, q, s, Phi, J, one, two):
     one, two : shape (4,)
         Work arrays.
     """
-    n = 3 * linkage.n_bodies
+    n, joint = 3 * linkage.n_bodies, linkage.joint
     for i in range(n):
         Phi[i] = 0.0
         for j in range(n):
             J[i, j] = 0.0
-    for k in range(linkage.joint.shape[0]):
-        kind, p1, p2, row = (
-            linkage.joint[k, 0],
-            linkage.joint[k, 1],
-            linkage.joint[k, 2],
-            linkage.joint[k, 3],
-        )
+    for k in range(joint.shape[0]):
+        kind, p1, p2, row = joint[k, 0], joint[k, 1], joint[k, 2], joint[k, 3]
         if kind == PARALLEL:
             Phi[row] = q[p1, 2] - q[p2, 2] - linkage.value[lane, k, 0]
             add_row(J, row, p1, 0.0, 0.0, 1.0)
@@ -217,17 +212,12 @@ def drive(linkage, lane, q, s, Phi, J, row, one, two):
 @compiled(python=False)
 def curvature(linkage, lane, arc, q, v, right, one, two):
     """Write `-(Phi_qq v) v`, the right-hand side for the second derivative; v as q."""
-    n = 3 * linkage.n_bodies
+    n, joint = 3 * linkage.n_bodies, linkage.joint
     for i in range(n):
         right[i] = 0.0
-    for k in range(linkage.joint.shape[0] + 1):
-        if k < linkage.joint.shape[0]:
-            kind, p1, p2, row = (
-                linkage.joint[k, 0],
-                linkage.joint[k, 1],
-                linkage.joint[k, 2],
-                linkage.joint[k, 3],
-            )
+    for k in range(joint.shape[0] + 1):
+        if k < joint.shape[0]:
+            kind, p1, p2, row = joint[k, 0], joint[k, 1], joint[k, 2], joint[k, 3]
             radius = linkage.value[lane, k, 0]
             if kind == CAM:
                 p2 = linkage.arc_point[arc[k]]
