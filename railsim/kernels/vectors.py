@@ -94,17 +94,8 @@ def vector_at(rows, row, column):
 @compiled(inline=True)
 def matrix_at(rows, row, column):
     """Matrix of numbers that begins in a column of a table's row."""
-    return (
-        rows[row, column],
-        rows[row, column + 1],
-        rows[row, column + 2],
-        rows[row, column + 3],
-        rows[row, column + 4],
-        rows[row, column + 5],
-        rows[row, column + 6],
-        rows[row, column + 7],
-        rows[row, column + 8],
-    )
+    two = vector_at(rows, row, column) + vector_at(rows, row, column + 3)
+    return two + vector_at(rows, row, column + 6)
 
 
 @compiled(inline=True)
