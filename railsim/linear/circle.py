@@ -63,7 +63,6 @@ def circle(
     """
     if friction is None:
         friction = tuple(track.friction_at(at).tolist())
-    both = (friction, friction) if isinstance(friction, float | int) else tuple(friction)
     support = track.support.model_dump(exclude_none=True)
     if track.support.variation:
         places, *factors = np.transpose(track.support.variation)
@@ -74,7 +73,7 @@ def circle(
         irregularities=[],
         gauge_widening=None,
         friction_table=None,
-        friction=both,
+        friction=friction,
         sections=[],
         check_rail=[],
         support=support,

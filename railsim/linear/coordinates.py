@@ -101,13 +101,17 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
     number = {int(body): w for w, body in enumerate(model.system.contact.body)}
     wheelsets = [number.get(b, -1) for b, _ in both] + [-1] * len(rest)
     forceless = []
-    if not held:
-        track, track_names = track_indices(model)
+    support = model.system.support
+    if support.elastic and not held:
+        first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(number)
+        moving = DOF if support.sleeper else RAIL_DOF
+        track = [first + SUPPORT_SIZE * w + k for w in range(len(number)) for k in range(moving)]
+        parts = [f"{w}.{part}" for w in model.index.wheelsets for part in TRACK_PARTS[:moving]]
         indices += [*track, *(k + RATE for k in track)]
-        rest += [*track_names, *(f"{name}'" for name in track_names)]
+        rest += [*parts, *(f"{part}'" for part in parts)]
         steps += [STEP] * len(track) + [RATE_STEP] * len(track)
-        wheelsets += [*np.repeat(range(len(number)), len(track) // len(number))] * 2
-        if model.system.support.massless:
+        wheelsets += [*np.repeat(range(len(number)), moving)] * 2
+        if support.massless:
             forceless = list(range(len(indices) - len(track), len(indices)))
     return Coordinates(
         names=(*names, *rest),
@@ -122,30 +126,13 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
     )
 
 
-def track_indices(model: Model) -> tuple[list[int], list[str]]:
-    """Indices of the displacements of elastic rails and sleepers in the state, and their names."""
-    support = model.system.support
-    if not support.elastic:
-        return [], []
-    first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(model.index.wheelsets)
-    moving = DOF if support.sleeper else RAIL_DOF
-    wheelsets, parts = model.index.wheelsets, TRACK_PARTS[:moving]
-    indices = [first + SUPPORT_SIZE * w + k for w in range(len(wheelsets)) for k in range(moving)]
-    return indices, [f"{wheelset}.{part}" for wheelset in wheelsets for part in parts]
-
-
 def _internal_names(model: Model) -> list[str]:
     """Names of the internal states after their elements."""
-    system = model.system
-    names = [""] * len(system.internal.kind)
-    for name, i in zip(model.index.links, system.links.internal, strict=True):
-        if i >= 0:
-            names[i] = name
-    for name, row in zip(model.index.mounts, system.mounts.internal, strict=True):
-        for axis, i in enumerate(row):
-            if i >= 0:
-                names[i] = f"{name}.{'xyz'[axis]}"
-    return names
+    system, index = model.system, model.index
+    names = dict(zip(system.links.internal.tolist(), index.links, strict=True))
+    rows = zip(index.mounts, system.mounts.internal.tolist(), strict=True)
+    names |= {i: f"{name}.{axis}" for name, row in rows for axis, i in zip("xyz", row, strict=True)}
+    return [names.get(i, "") for i in range(len(system.internal.kind))]
 
 
 class FreeVehicle:

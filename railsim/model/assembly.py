@@ -122,14 +122,10 @@ class Model:
     @property
     def n_state(self) -> int:
         """Length of the state vector."""
-        system = self.system
-        first = contact_begin(self.index.n_bodies, len(system.internal.kind))
-        return first + sum(per_wheelset(system)) * len(system.contact.body) + N_SCALARS
-
-
-def per_wheelset(system: System) -> tuple[int, int]:
-    """Entries of a wheelset in the state: of its patches, then of its track."""
-    return TRANSIENT_SIZE * system.contact.transient, SUPPORT_SIZE * system.support.elastic
+        contact, elastic = self.system.contact, self.system.support.elastic
+        first = contact_begin(self.index.n_bodies, len(self.system.internal.kind))
+        per_wheelset = TRANSIENT_SIZE * contact.transient + SUPPORT_SIZE * elastic
+        return first + per_wheelset * len(contact.body) + N_SCALARS
 
 
 def assemble(

@@ -312,7 +312,7 @@ def _vehicle_growth(model: Model, system: System, state: Floats) -> float:
             raise ModelError("the state of steady rolling lies outside the contact table")
         return derivatives
 
-    columns = _jacobian(rates, state, _moving(system, state))
+    columns = _jacobian(rates, system, state)
     return float(np.max(np.linalg.eigvals(columns).real))
 
 
@@ -354,7 +354,7 @@ def _step_growth(
             return np.inf
     # without masses the reference scheme balances the track's forces to 0.01 N only
     iterates = scheme == "rk4" and system.support.elastic and system.support.massless
-    columns = _jacobian(stepped, state, _moving(system, state), 1e-6 if iterates else 1e-8)
+    columns = _jacobian(stepped, system, state, 1e-6 if iterates else 1e-8)
     if not np.isfinite(columns).all():
         return np.inf
     if enough > 0.0 and (bound := _bound(columns, enough * h)):
@@ -419,21 +419,19 @@ def _bound(matrix: Floats, limit: float) -> float:
 
 
 def _jacobian(
-    function: Callable[[Floats], Floats], state: Floats, moving: Integers, step: float = 1e-8
+    function: Callable[[Floats], Floats], system: System, state: Floats, step: float = 1e-8
 ) -> Floats:
-    """Jacobian of the entries `moving` by forward differences; the function takes many states."""
+    """Jacobian by forward differences of the entries that move; the function takes many states.
+
+    These are not position and speed, nor what slopes have learnt.
+    """
+    end = len(state) - N_SCALARS
+    moving = np.arange(end)
+    if system.support.elastic:
+        first = end - SUPPORT_SIZE * len(system.contact.body)
+        moving = moving[(moving < first) | ((moving - first) % SUPPORT_SIZE < LEARNT)]
     trials = np.repeat(state[None], moving.size + 1, axis=0)  # the state itself is the first
     changes = step * np.maximum(1.0, np.abs(state[moving]))
     trials[np.arange(1, moving.size + 1), moving] += changes
     found = function(trials)[:, moving]
     return np.ascontiguousarray(((found[1:] - found[0]) / changes[:, None]).T)
-
-
-def _moving(system: System, state: Floats) -> Integers:
-    """Entries of a state that move: not position and speed, nor what slopes have learnt."""
-    end = len(state) - N_SCALARS
-    indices = np.arange(end)
-    if not system.support.elastic:
-        return indices
-    first = end - SUPPORT_SIZE * len(system.contact.body)
-    return indices[(indices < first) | ((indices - first) % SUPPORT_SIZE < LEARNT)]
