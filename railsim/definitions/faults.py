@@ -72,18 +72,13 @@ def _written_path(detail: Any, data: Any) -> tuple[str, ...]:
     node = data
     location, last = detail["loc"], len(detail["loc"]) - 1
     for depth, item in enumerate(location):
-        if _holds(node, item):
+        known = range(len(node)) if isinstance(node, list) else node
+        if isinstance(node, dict | list) and item in known:
             node = node[item]
         elif not (isinstance(node, dict) and depth == last and detail["type"] == "missing"):
             continue
         path.append(str(item))
     return tuple(path)
-
-
-def _holds(node: Any, item: str | int) -> bool:
-    if isinstance(node, list):
-        return isinstance(item, int) and item < len(node)
-    return isinstance(node, dict) and item in node
 
 
 def _wording(detail: Any, model: type[BaseModel]) -> tuple[str, str]:

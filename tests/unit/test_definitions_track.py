@@ -208,7 +208,7 @@ def test_usual_supports_dips_and_check_rails_are_not_remarked_on():
         ],
         speed=97.0,
     )
-    assert track_remarks(usual) == []
+    assert [*track_remarks(usual)] == []
 
 
 def test_a_radius_of_5_m_is_the_smallest():
@@ -221,7 +221,7 @@ def test_a_radius_of_5_m_is_the_smallest():
 
 @pytest.mark.parametrize("name", ["straight", "curve_r500"])
 def test_shipped_track_gives_no_cause_for_remarks(name):
-    assert track_remarks(load_track(name)) == []
+    assert [*track_remarks(load_track(name))] == []
 
 
 def test_cant_of_the_curving_study_is_high_for_its_radius():
@@ -231,7 +231,7 @@ def test_cant_of_the_curving_study_is_high_for_its_radius():
 
 def test_circle_of_infinite_radius_is_straight_to_the_rules():
     straight = [{"type": "CIR", "length": 90.0, "radius": -math.inf}]
-    assert track_remarks(track(straight, speed=20.0)) == []
+    assert [*track_remarks(track(straight, speed=20.0))] == []
 
 
 def into_curve(radius, cant, length, speed):
@@ -257,7 +257,7 @@ def test_a_half_wave_in_short_elements_is_one_transition():
     rise = [{**RAMP, "length": 2.0, "cant_start": 0.1 * a, "cant_end": 0.1 * b} for a, b in ends]
     plan = [STRAIGHT, *bend, {**CIRCLE, "radius": 1000.0}]
     cant = [{**LEVEL, "length": 100.0}, *rise, {**CANTED, "length": 80.0}]
-    assert track_remarks(track(plan, cant, rounding=5.0, speed=30.0)) == []
+    assert [*track_remarks(track(plan, cant, rounding=5.0, speed=30.0))] == []
     # 100 mm of cant at 144 km/h ask for 80 m: of a shorter one there is one remark
     short = [{**part, "length": 1.0} for part in bend], [{**part, "length": 1.0} for part in rise]
     plan[1:-1], cant[1:-1] = short
@@ -395,7 +395,7 @@ def test_a_curve_is_judged_where_its_cant_is_worst(speed, expected, sense):
 
 def test_cant_list_shorter_than_the_plan_is_usual():
     track_ = track([CIRCLE, {**CIRCLE, "length": 500.0}], [CANTED])
-    assert track_remarks(track_) == []
+    assert [*track_remarks(track_)] == []
     assert cant_sections(track_)[-1].end == 80.0
 
 

@@ -16,7 +16,7 @@ from railsim.arrays import Floats
 from railsim.definitions.embedding import embed, tables_of
 from railsim.definitions.excitations.base import CHANNELS, COLUMNS, rails_moved
 from railsim.definitions.excitations.measured import READING, Measured
-from railsim.definitions.excitations.recording import BANDS, band_passed, equal_step, from_chord
+from railsim.definitions.excitations.recording import BANDS, band_passed, from_chord
 from railsim.errors import Fault, Faults, changed_faults, counted, input_error, nearest
 from railsim.files.access import TABLE_BYTES, read_bytes
 
@@ -126,8 +126,7 @@ def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None
     columns = _mapped(path, head, how.columns) if how.columns else _header(path, head)
     columns = [column and _as_told(column, how) for column in columns]
     named = [column for column in columns if column]
-    _check_once(path, {column.name for column in named})
-    _check_told(how, [column.name for column in named])
+    _check_names(path, [column.name for column in named], how)
     faults: list[tuple[int, str, str]] = []  # number of the line, found, allowed
     numbers, table = [], []
     for number, line in numbered[1:]:
@@ -149,12 +148,21 @@ def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None
     return _filtered(path, rows, how), mileage
 
 
-def _check_once(path: Path, names: set[str]) -> None:
-    """Raise InputError where a file gives single rails and what is worked out from them."""
-    faults = Faults()
+def _check_names(path: Path, read: Sequence[str], how: Measured) -> None:
+    """Raise InputError where a file gives single rails and what is worked out from them.
+
+    Or where a unit, an offset or a sign is given of a column that is not read.
+    """
+    told = {"units": how.units or (), "offset": how.offset or (), "reverse": how.reverse}
+    faults = Faults(
+        Fault("", key, f"'{name}' is no column that is read", nearest(name, read))
+        for key, names in told.items()
+        for name in names
+        if name not in read
+    )
     for rails, track in EITHER:
-        if names & rails and names & track:
-            found = " and ".join(sorted(names & (rails | track)))
+        if rails & {*read} and track & {*read}:
+            found = " and ".join(sorted({*read} & (rails | track)))
             allowed = (
                 f"{' and '.join(sorted(rails))}, or {' and '.join(sorted(track))}: they add up"
             )
@@ -162,17 +170,6 @@ def _check_once(path: Path, names: set[str]) -> None:
                 Fault(str(path), "header", found, f"{allowed}; name the ones in 'columns'")
             )
     faults.check()
-
-
-def _check_told(how: Measured, read: Sequence[str]) -> None:
-    """Raise InputError where a unit, an offset or a sign is given of a column that is not read."""
-    told = {"units": how.units or (), "offset": how.offset or (), "reverse": how.reverse}
-    Faults(
-        Fault("", key, f"'{name}' is no column that is read", nearest(name, read))
-        for key, names in told.items()
-        for name in names
-        if name not in read
-    ).check()
 
 
 def _numbers(cells: Sequence[str], columns: Sequence[Column | None]) -> list[float]:
@@ -230,8 +227,9 @@ def _filtered(path: Path, rows: Floats, how: Measured) -> Floats:
     """Rows with the chord's response inverted and within the band, as the definition asks."""
     if not how.chord and not how.band:
         return rows
-    step = equal_step(rows[:, 0])
-    if step is None:
+    steps = np.diff(rows[:, 0])
+    step = float(np.mean(steps))
+    if np.max(np.abs(steps - step)) > 0.01 * step:
         allowed = f"equal steps within 1 % (needed for '{'chord' if how.chord else 'band'}')"
         raise input_error(path, "rows at unequal steps", allowed, "s")
     values = rows[:, 1:].T

@@ -21,13 +21,6 @@ ORDER = 4  # of the Butterworth band pass
 BLIND = 0.1
 
 
-def equal_step(s: Floats) -> float | None:
-    """Step of equally spaced arc lengths [m]; None where the steps differ by more than 1 %."""
-    steps = np.diff(s)
-    mean = float(np.mean(steps))
-    return mean if np.max(np.abs(steps - mean)) <= 0.01 * mean else None
-
-
 def band_passed(values: Floats, step: float, wavelengths: tuple[float, float]) -> Floats:
     """Butterworth band pass of order 4 by its magnitude alone: no phase.
 

@@ -388,7 +388,4 @@ class Mechanism(FileDefinition):
 
     def unit_of(self, name: str) -> str:
         """Unit of a parameter."""
-        for unit, names in self.units.items():
-            if name in names:
-                return unit
-        return "m"
+        return next((unit for unit, names in self.units.items() if name in names), "m")

@@ -1,6 +1,7 @@
 """What the parts of a mechanism file say together: names, parameters, freedoms, sizes."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ LARGEST = 50.0  # m; no mechanism of a vehicle is larger
 OUT_OF_PROPORTION = 100.0
 MOST_TURNED = 12.5  # rad; two turns
 ROWS = {"revolute": 2, "link": 1, "slot": 1, "prismatic": 2, "cam": 1}
+_fault = partial(Fault, "")
 
 
 def mechanism_faults(mechanism: Mechanism) -> list[Fault]:
@@ -73,10 +75,6 @@ def bounds_of(mechanism: Mechanism) -> Iterator[tuple[str, float, float]]:
         values = parameter_values(mechanism)
         for name, (low, high) in mechanism.optimise.bounds.items():
             yield name, number(low, values), number(high, values)
-
-
-def _fault(key: str, found: str, allowed: str) -> Fault:
-    return Fault("", key, found, allowed)
 
 
 def _parameter_faults(mechanism: Mechanism) -> Iterator[Fault]:

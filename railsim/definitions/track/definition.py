@@ -159,7 +159,7 @@ class Track(FileDefinition, Plottable):
 
     def unusual(self) -> list[base.Remark]:
         """Return what an engineer would object to."""
-        return track_remarks(self)
+        return [*track_remarks(self)]
 
     def _table(self) -> Table:
         """Return the table of the plan's elements that a notebook shows."""

@@ -97,48 +97,44 @@ def track_faults(track: "Track") -> list[Fault]:
     return faults
 
 
-def track_remarks(track: "Track") -> list[Remark]:
-    """Return what is allowed in a track but unusual."""
+def track_remarks(track: "Track") -> Iterator[Remark]:
+    """Yield what is allowed in a track but unusual."""
     plan, cant, vertical = curvature_sections(track), cant_sections(track), gradient_sections(track)
-    remarks = []
     for before, behind in _steps(plan):
         radii = [_written("radius", kappa) for kappa in (before.end_value, behind.start_value)]
         text = f"the radius steps from {radii[0]} to {radii[1]} without a transition (CLO)"
-        remarks.append(Remark(behind.key, text))
-    text = "the gradient steps without a vertical curve (LIR)"
-    remarks += [Remark(behind.key, text) for _, behind in _steps(vertical)]
-    remarks += [*_too_long("cant", cant, plan), *_too_long("vertical", vertical, plan)]
-    remarks += [*_cant_sizes(cant), *_cant_sides(cant, plan), *_cant_base(cant, track.rail_base)]
+        yield Remark(behind.key, text)
+    for _, behind in _steps(vertical):
+        yield Remark(behind.key, "the gradient steps without a vertical curve (LIR)")
+    yield from (*_too_long("cant", cant, plan), *_too_long("vertical", vertical, plan))
+    yield from (*_cant_sizes(cant), *_cant_sides(cant, plan), *_cant_base(cant, track.rail_base))
     if max(track.frictions) > MOST_FRICTION:
         key = "friction_table" if track.friction_table else "friction"
         text = f"a coefficient of {max(track.frictions):g} is beyond that of steel on steel, below"
-        remarks.append(Remark(key, f"{text} {MOST_FRICTION:g}"))
+        yield Remark(key, f"{text} {MOST_FRICTION:g}")
     if track.friction_table and track.friction != type(track).model_fields["friction"].default:
-        remarks.append(Remark("friction", "has no effect: friction_table takes its place"))
-    remarks += [*_supports(track.support), *_check_rails_at_once(track), *_slopes(track)]
+        yield Remark("friction", "has no effect: friction_table takes its place")
+    yield from (*_supports(track.support), *_check_rails_at_once(track), *_slopes(track))
     if track.speed is not None and track.speed > FASTEST:
         text = f"{track.speed:g} m/s are {3.6 * track.speed:.0f} km/h: is the speed in m/s?"
-        remarks.append(Remark("speed", text))
+        yield Remark("speed", text)
     if track.speed is not None and abs(track.gauge - NORMAL_GAUGE) <= WIDENED:
-        remarks += alignment_remarks(plan, cant, vertical, track.speed)
+        yield from alignment_remarks(plan, cant, vertical, track.speed)
     for section in (*joined(plan), *joined(cant), *joined(vertical)):
         if section.slope != 0.0 and section.length < track.rounding - SMALL:
-            text = (
-                f"the transition is shorter ({section.length:g} m) than the rounding "
-                f"({track.rounding:g} m), which flattens it"
-            )
-            remarks.append(Remark(section.key, text))
+            text = f"the transition is shorter ({section.length:g} m) than the rounding"
+            yield Remark(section.key, f"{text} ({track.rounding:g} m), which flattens it")
     for sections in (plan, cant, vertical):
-        remarks += _not_reached(sections, track.rounding)
+        yield from _not_reached(sections, track.rounding)
     for k, part in enumerate(track.sections):
         if text := part.unusual():
-            remarks.append(Remark(f"sections.{k}", text))
+            yield Remark(f"sections.{k}", text)
     for k, shape in enumerate(track.irregularities):
         begin, end = shape.extent(track.length)
         fade = getattr(shape, "fade", 0.0)
         if 2.0 * fade > end - begin > 0.0:
             text = f"{fade:g} m at either end of {end - begin:g} m: half of them is taken"
-            remarks.append(Remark(f"irregularities.{k}.fade", text))
+            yield Remark(f"irregularities.{k}.fade", text)
     for key, begin, end, shift in _spans(track):
         if end <= 0.0 or begin >= track.length:  # the track sees nothing of it
             span = f"from {begin:g} to {end:g} m" if begin <= end else f"from {begin:g} m on"
@@ -147,11 +143,11 @@ def track_remarks(track: "Track") -> list[Remark]:
                 to = shift - begin if track.falling_mileage else -track.mileage or shift - begin
                 at = begin - shift + to
                 text += f"; is it a mileage? shift = {to:.9g} puts its begin at s = {at:g}"
-            remarks.append(Remark(key, text))
+            yield Remark(key, text)
         elif key.startswith("sections.") and (begin < 0.0 or end > track.length):
             text = f"from {begin:g} to {end:g} m, partly beyond the track's {track.length:g} m"
-            remarks.append(Remark(key, text))
-    return [*remarks, *_mileages(track)]
+            yield Remark(key, text)
+    yield from _mileages(track)
 
 
 def _supports(support: Support) -> Iterator[Remark]:
