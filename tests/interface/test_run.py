@@ -243,7 +243,8 @@ def test_json_is_all_that_stdout_holds(tmp_path, capsys):
     result = railsim.open_result(path)
     assert data["file"] == str(path)
     largest = next(peak for peak in data["peaks"] if peak["quantity"] == "Q")
-    assert abs(largest["value"]) == np.max(result.groups["peaks"]["Q"])
+    # of peaks that are equal but for rounding the first wheel's is printed
+    assert abs(largest["value"]) == pytest.approx(np.max(result.groups["peaks"]["Q"]), rel=1e-12)
     assert largest["unit"] == "N"
     assert data["mid_curves"] == []
 
