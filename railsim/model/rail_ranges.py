@@ -20,6 +20,8 @@ from railsim.errors import ModelError, input_error
 from railsim.kernels.contact_table import N_FIELD, N_PATCH, RailTables
 from railsim.profiles.profile import Profile
 
+ANOTHER = 0.02  # m, beyond side wear: gauge sides so far apart are those of wing and nose
+
 
 @dataclass(frozen=True, eq=False)
 class RailRanges:
@@ -119,13 +121,7 @@ def _range(
     assert part.contours is not None
     contours = tuple(np.array([contour.y, contour.z]) for contour in part.contours)
     sections = SectionList(np.array([contour.s for contour in part.contours]), contours)
-    y, z = contours[0]
-    try:
-        face = gauge_face(y, z - z.min()) if part.gauge_face is None else part.gauge_face
-    except ValueError as error:
-        raise input_error(
-            "track", f"{error} in the first section", "14 mm, or a number", "sections.gauge_face"
-        ) from error
+    face = _gauge_face(contours) if part.gauge_face is None else part.gauge_face
     return Range(
         sections=sections,
         begin=round(part.begin - part.shift, 9),
@@ -136,3 +132,20 @@ def _range(
         plain=plain,
         normal=normal,
     )
+
+
+def _gauge_face(contours: tuple[Floats, ...]) -> float:
+    """That of the first section, where it and the last one are those of one rail [m]."""
+    found = []
+    for which, (y, z) in (("first", contours[0]), ("last", contours[-1])):
+        try:
+            found.append(gauge_face(y, z - z.min()))
+        except ValueError as error:
+            allowed = "14 mm, or a number"
+            fault = f"{error} in the {which} section"
+            raise input_error("track", fault, allowed, "sections.gauge_face") from error
+    moved = found[1] - found[0]
+    if abs(moved) > ANOTHER:
+        fault = f"the last section's gauge side is {1e3 * moved:.0f} mm beside the first one's"
+        raise input_error("track", fault, "a number", "sections.gauge_face")
+    return found[0]

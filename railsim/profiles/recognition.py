@@ -384,7 +384,7 @@ def _orient_rail(work: Points) -> float:
     nearest = float(standards[np.argmin(np.abs(standards - inclination))])
     if abs(nearest - inclination) < 3e-3:
         inclination = nearest
-    work.notes.append(f"already inclined, 1:{1.0 / inclination:.0f}")
+    work.notes.append(f"already inclined, 1:{1.0 / inclination:.0f}; that of the track counts")
     return float(inclination)
 
 

@@ -240,7 +240,8 @@ def test_inclined_rail_is_recognised_and_not_inclined_twice(tmp_path, inclinatio
     path = written(tmp_path, "rail.csv", csv_mm(side * turned[0], turned[1]))
     profile = load_profile(path, "rail")
     assert profile.inclination == pytest.approx(inclination, abs=1e-12)
-    assert any("already inclined" in line for line in profile.notes)
+    (note,) = [line for line in profile.notes if "already inclined" in line]
+    assert note.endswith(f"1:{1.0 / inclination:.0f}; that of the track counts")
     assert same_contact(profile, "60E1") < 1.5e-6
 
 

@@ -82,6 +82,17 @@ def test_first_section_without_a_gauge_face_is_named(tmp_path):
         assemble(load_vehicle("coach_manchester"), track, load_settings())
 
 
+@pytest.mark.parametrize(
+    "turned", [["begin=49.6", "end=50.5"], ["trailing=true", "begin=49.5", "end=50.4"]]
+)
+def test_range_that_ends_between_wing_and_nose_needs_a_gauge_face(turned):
+    """At one end the wing is the highest rail: 97 mm from the gauge side of the other end."""
+    track = load_track("crossing_56e1_r245_1in9.25", [f"sections.0.{one}" for one in turned])
+    part = track.sections[0].model_copy(update={"gauge_face": None})
+    with pytest.raises(InputError, match=r"gauge side is -?97 mm beside the first one's; a number"):
+        assemble(load_vehicle("wagon_y25"), track.replace(sections=[part]), load_settings())
+
+
 def test_a_trailing_list_is_passed_from_its_end(tmp_path):
     """The flatter section at s = -1.5 m of the list is at 50 + 1.5 m of the track."""
     listed = [(s, Y, TOP * (0.9 if s == -1.5 else 1.0)) for s in np.round(PLACES - 2.0, 9)]

@@ -72,7 +72,8 @@ class RailSections(Definition):
     their sign before `shift` is added"""
     gauge_face: Annotated[Finite, Field(ge=-0.1, le=0.1)] | None = None
     """Lateral position of the gauge face of the plain rail in the coordinates of the list, 14 mm
-    below the top [m]; by default that of the first section that is kept"""
+    below the top [m]; by default that of the first section that is kept, if that
+    of the last one is within 20 mm of it"""
     begin: Finite
     """Where the range begins [m]; before it, and behind its end, the rail is that of `rail`"""
     end: Finite

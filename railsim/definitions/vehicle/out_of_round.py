@@ -39,7 +39,7 @@ class Harmonics(Uneven):
         tuple[tuple[Annotated[Finite, Field(ge=1, le=500)], Change, Finite], ...],
         Field(min_length=1, max_length=MOST_WAVES),
     ]
-    """Rows of order, amplitude [m] and phase [rad]"""
+    """Rows of order n, amplitude a [m] and phase p [rad]: the radius has a cos(n angle + p) more"""
 
     def backwards(self, **values: object) -> Self:
         """Return the waves with their phases on a wheel that rolls the other way."""
