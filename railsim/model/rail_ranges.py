@@ -136,16 +136,13 @@ def _range(
 
 def _gauge_face(contours: tuple[Floats, ...]) -> float:
     """That of the first section, where it and the last one are those of one rail [m]."""
-    found = []
-    for which, (y, z) in (("first", contours[0]), ("last", contours[-1])):
-        try:
-            found.append(gauge_face(y, z - z.min()))
-        except ValueError as error:
-            allowed = "14 mm, or a number"
-            fault = f"{error} in the {which} section"
-            raise input_error("track", fault, allowed, "sections.gauge_face") from error
-    moved = found[1] - found[0]
-    if abs(moved) > ANOTHER:
-        fault = f"the last section's gauge side is {1e3 * moved:.0f} mm beside the first one's"
-        raise input_error("track", fault, "a number", "sections.gauge_face")
-    return found[0]
+    key = "sections.gauge_face"
+    try:
+        first, last = (gauge_face(y, z - z.min()) for y, z in (contours[0], contours[-1]))
+    except ValueError as error:
+        fault = f"{error} in the first or last section"
+        raise input_error("track", fault, "14 mm, or a number", key) from error
+    if abs(last - first) > ANOTHER:
+        fault = f"the last section's gauge side is {1e3 * (last - first):.0f} mm beside the first's"
+        raise input_error("track", fault, "a number", key)
+    return first

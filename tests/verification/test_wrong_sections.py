@@ -89,7 +89,7 @@ def test_range_that_ends_between_wing_and_nose_needs_a_gauge_face(turned):
     """At one end the wing is the highest rail: 97 mm from the gauge side of the other end."""
     track = load_track("crossing_56e1_r245_1in9.25", [f"sections.0.{one}" for one in turned])
     part = track.sections[0].model_copy(update={"gauge_face": None})
-    with pytest.raises(InputError, match=r"gauge side is -?97 mm beside the first one's; a number"):
+    with pytest.raises(InputError, match=r"gauge side is -?97 mm beside the first's; a number"):
         assemble(load_vehicle("wagon_y25"), track.replace(sections=[part]), load_settings())
 
 
