@@ -12,21 +12,28 @@ of z and roll stay, the column of y becomes
 
     A_y = H[F] - A_z H[z] - A_roll H[roll],
 
-so that a motion along the path has just these forces, and the tangent is the limit of small a.
+so that a motion along the path has just these forces, and the tangent is the limit of small a.  In
+hunting the yaw rate is in phase with y, the yaw angle and the lateral velocity a quarter ahead or
+behind: their columns, the slopes of the creep forces, are the means of 2 sin^2 and 2 cos^2 times
+those along the path.  Else the slopes at rest, where the patch of worn or conforming profiles is
+larger than beside it, would meet the rolling radii of the path.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError, argument_error
 from railsim.linear.coordinates import FreeVehicle
-from railsim.notation import ROLL, Y, Z
+from railsim.notation import ROLL, YAW, Y, Z
 
 ANGLES = 24
 BALANCED = 1e-2  # N and N m, of a wheelset's vertical force and roll moment
 MOST_ITERATIONS = 15
 SLOW = 0.1  # ratio of two residuals from which on slopes are formed again
 STEP = 1e-8  # m and rad
+CREEP = 1e-6  # m/s, rad/s and rad, for slopes of the creep forces
 
 
 class ContactPath:
@@ -39,14 +46,17 @@ class ContactPath:
         self._slopes: dict[float, Floats] = {}
 
     def matrix(self, vehicle: FreeVehicle, tangent: Floats) -> Floats:
-        """Return the matrix of a linearisation with the columns of y replaced.
+        """Return the matrix of a linearisation with the columns of y and of creepage replaced.
 
         `tangent`: its tangent matrix. Raises InputError: the contact table is narrower than the
         amplitude.
         """
-        place = vehicle.coordinates.position_of
+        place, velocity = vehicle.coordinates.position_of, vehicle.coordinates.velocity_of
         bodies = vehicle.system.contact.body
         columns = np.array([[place[b, k] for k in (Y, Z, ROLL)] for b in bodies])
+        creeping = [
+            [of[b, k] for b in bodies] for of, k in ((velocity, YAW), (velocity, Y), (place, YAW))
+        ]
         # sin(theta) has the same value at two angles of a quadrant's pair
         sines = np.sin(2.0 * np.pi * (np.arange(ANGLES // 4) + 0.5) / ANGLES)
         sines = np.concatenate([sines, -sines])
@@ -55,7 +65,8 @@ class ContactPath:
             moved = np.tile(vehicle.x, (*poses.shape[:2], 1))
             for w, column in enumerate(columns):  # each alone
                 moved[:, w, column] += poses[:, w]
-            rates = vehicle.rates(moved.reshape(-1, len(vehicle.x))).reshape(moved.shape)
+            rates = _rates(vehicle, moved)
+            slopes = [_slopes(vehicle, moved, of) for of in creeping]
         except ModelError as error:
             words = f"found {1e3 * self.amplitude:.12g} mm, but {error}"
             raise argument_error("amplitude", words, "a smaller amplitude") from None
@@ -64,6 +75,9 @@ class ContactPath:
         found = tangent.copy()
         for (y, z, roll), rate, (_, height, angle) in zip(columns, force, path, strict=True):
             found[:, y] = rate - tangent[:, z] * height - tangent[:, roll] * angle
+        with_y, beside = 4.0 * sines**2 / ANGLES, 4.0 * (1.0 - sines**2) / ANGLES
+        for of, share, slope in zip(creeping, (with_y, beside, beside), slopes, strict=True):
+            found[:, of] = np.tensordot(share, slope, 1).T
         return found
 
     def _path(self, vehicle: FreeVehicle, columns: Integers, sines: Floats) -> Floats:
@@ -102,6 +116,17 @@ class ContactPath:
                 break
             before = size
         raise ModelError("no contact path")
+
+
+def _rates(vehicle: FreeVehicle, moved: Floats) -> Floats:
+    return vehicle.rates(moved.reshape(-1, len(vehicle.x))).reshape(moved.shape)
+
+
+def _slopes(vehicle: FreeVehicle, moved: Floats, of: Sequence[int]) -> Floats:
+    """Derivatives of the rates with respect to a coordinate of each wheelset, as `moved`."""
+    step = np.zeros(moved.shape[1:])
+    step[np.arange(len(of)), of] = CREEP
+    return (_rates(vehicle, moved + step) - _rates(vehicle, moved - step)) / (2.0 * CREEP)
 
 
 def _forces(vehicle: FreeVehicle, x: Floats) -> Floats:

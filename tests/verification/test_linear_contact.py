@@ -8,7 +8,7 @@ from dynamics import Settings, changed, load_track, load_vehicle
 from rig import test_vehicle
 from selection import points
 
-from railsim.contact import table
+from railsim.contact import contact_geometry, table
 from railsim.contact.table import TableGrid
 from railsim.errors import InputError
 from railsim.kernels.time_loop import Chunk, time_loop
@@ -19,7 +19,7 @@ from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle, smooth_law
 from railsim.model.time_step import SCHEMES, Stability, empty_recorder
 from railsim.model.work import CONSTANT_SPEED, level_track_with_friction, work_arrays
-from railsim.profiles import Profile
+from railsim.profiles import Profile, load_profile
 from railsim.profiles.builtin import arc_chain_rail
 
 RIGID = {"preset": "rigid"}
@@ -75,6 +75,28 @@ def coned():
         )
 
     return prepared
+
+
+def test_free_wheelset_hunts_with_the_equivalent_conicity_of_its_profiles():
+    """S1002 on 60E1 under 44 kN, 3 mm: 0.177 by quadrature of the rigid contact's rolling radii.
+
+    Slopes of the creep force as at rest, where the patch is twice as large, made it 0.11.
+    """
+    alone = test_vehicle("single_wheelset")
+    changes = {"profile": ("S1002", "S1002"), "mass": 9000.0}
+    loaded = alone.wheelsets["wheelset"].model_copy(update=changes)
+    speed, amplitude = 2.0, 3e-3
+    slow = LinearVehicle(
+        alone.replace(wheelsets={"wheelset": loaded}),
+        STRAIGHT,
+        contact=Contact("harmonic", amplitude),
+    )
+    values = np.linalg.eigvals(slow.linearised(speed).matrix).imag
+    hunting = values[(values > 0.5) & (values < 5.0)]
+    (expected,) = contact_geometry(
+        load_profile("S1002"), load_profile("60E1"), inclination=STRAIGHT.inclination
+    ).equivalent_conicity([amplitude])
+    assert (hunting / speed) ** 2 * 0.46 * 0.75 == pytest.approx([expected], rel=0.05)
 
 
 @points(
