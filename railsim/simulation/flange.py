@@ -1,4 +1,4 @@
-"""The vehicle in the tightest curves of its track, for judging the time step in flange contact.
+"""The vehicle in tight curves and beside the middle of the track, for judging the time step there.
 
 In a flange the contact is stiff laterally, and its damping and its friction couple the motions of a
 wheelset in another way than on the treads.
@@ -6,6 +6,9 @@ wheelset in another way than on the treads.
 What is sought is a state of rest.  A short way into the curve gives Newton's method a beginning: a
 third of the time of settling.  Friction elements hold what the way left in them; with these, and
 where Newton's method finds nothing, the vehicle settles over a long way.
+
+On straight track wheels with hollow treads have further states of rest beside the middle, some of
+them in flange contact.
 """
 
 import math
@@ -16,6 +19,7 @@ from functools import partial
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.contact.geometry import geometry_of
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.kernels.contact_columns import W_Q
@@ -32,7 +36,7 @@ from railsim.model.check_rails import standing_at
 from railsim.model.equilibrium import tracks_under
 from railsim.model.time_step import Situation, empty_recorder, observed
 from railsim.model.work import CONSTANT_SPEED, uneven_rigid_rails, without_loads
-from railsim.notation import ROLL, YAW, Y
+from railsim.notation import ROLL, YAW, Y, Z
 from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import alignment_of
 from railsim.track.tables import track_tables
@@ -49,6 +53,8 @@ BEGIN = 2.0
 # The state sought is one of rest and does not depend on the contact damping: with more of it, it is
 # reached also where the wheelset would vibrate.
 MORE_DAMPING = 4.0
+ASIDE = (5e-3, 4e-3, 3e-3)  # m, where a vehicle on hollow treads is set down, until one stays aside
+LEAST_ASIDE = 1e-3  # m, of wheelsets of a state of rest that is another one than the middle
 
 
 def tight_curves(track: Track) -> list[tuple[float, float]]:
@@ -96,6 +102,36 @@ def in_flange_contact(
                 if _all_loaded(model, *at):
                     break
             below = WIDER * abs(curve[0])
+    return found
+
+
+def off_centre(model: Model, track: Track, system: System, rolling: Floats) -> list[Situation]:
+    """States of rest beside the middle of straight track, as vehicles on hollow treads have.
+
+    Sought where the wheel that is nearer to its rail has the smaller rolling radius somewhere.
+    `system`, `rolling`: of steady rolling on straight track.
+    """
+    wheelsets = [body.wheelset for body in model.flat.of_kind("wheelset") if body.wheelset]
+    shapes = [geometry_of(wheelset, track, model.profiles) for wheelset in wheelsets]
+    found = []
+    for side in (1.0,) if _symmetric(model, track, rolling) else (1.0, -1.0):
+        fitting = [shape for shape in shapes if shape is not None]
+        if not any((side * s.delta_r[side * s.lateral > 0.0] < 0.0).any() for s in fitting):
+            continue
+        for aside in ASIDE:
+            guess = rolling.copy()
+            positions = guess[: 6 * model.index.n_bodies].reshape(-1, 6)
+            positions[:, Y] += side * aside
+            for body, shape in zip(system.contact.body, shapes, strict=True):
+                if shape is not None:
+                    k = int(np.searchsorted(shape.lateral, side * aside))
+                    positions[body, [Z, ROLL]] += shape.centre_z[k], shape.roll[k]
+            with suppress(NotConverged):  # then from another place, or the others decide alone
+                state = SteadyRolling(model, system).solve(guess, float(rolling[SPEED]))
+                moved = (state - rolling)[: 6 * model.index.n_bodies].reshape(-1, 6)
+                if np.abs(moved[system.contact.body, Y]).max() > LEAST_ASIDE:
+                    found.append((system, state))
+                    break
     return found
 
 

@@ -38,7 +38,13 @@ from railsim.model.solutions import solution
 from railsim.model.time_step import Situation, Stability
 from railsim.model.work import level_track_with_friction, uneven_rigid_rails
 from railsim.simulation.auxiliary_track import Progress
-from railsim.simulation.flange import at_rest_beside, guided, in_flange_contact, narrowed
+from railsim.simulation.flange import (
+    at_rest_beside,
+    guided,
+    in_flange_contact,
+    narrowed,
+    off_centre,
+)
 from railsim.track.irregularity import shortest_wave
 
 CLASS = 1.2  # ratio of the speeds of a class
@@ -228,7 +234,8 @@ class StepChoice:
 
         def curving(step: float) -> list[tuple[Situation, float]]:
             found = []
-            for at in in_flange_contact(model, self._track, rolling, step, self._progress):
+            begun = in_flange_contact(model, self._track, rolling, step, self._progress)
+            for at in (*begun, *off_centre(model, self._track, level, rolling)):
                 found.append((at, 1.0))
                 where = model, self._track, at
                 for place in (at, *guided(*where), *narrowed(*where)):
