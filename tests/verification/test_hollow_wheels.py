@@ -159,7 +159,7 @@ def test_coach_on_hollow_wheels_runs_the_same_with_half_the_step(
 
 
 def test_step_holds_where_hollow_treads_keep_a_vehicle_beside_the_middle():
-    """On one flange, 7.4 mm aside, wheel loads do not vibrate; at 2.5 ms they did, by 18 % of Q0."""
+    """On one flange, 7.4 mm aside, wheel loads do not vibrate; at 2.5 ms by 18 % of Q0."""
     track = load_track("straight", ["inclination=0.05", "friction=0.32"])
     ends = itertools.product(("front", "rear"), ("outer", "inner"))
     aside = {f"{bogie}.{axle}.wheelset": {"y": 7.5e-3} for bogie, axle in ends}
