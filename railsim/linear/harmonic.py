@@ -16,7 +16,9 @@ so that a motion along the path has just these forces, and the tangent is the li
 hunting the yaw rate is in phase with y, the yaw angle and the lateral velocity a quarter ahead or
 behind: their columns, the slopes of the creep forces, are the means of 2 sin^2 and 2 cos^2 times
 those along the path.  Else the slopes at rest, where the patch of worn or conforming profiles is
-larger than beside it, would meet the rolling radii of the path.
+larger than beside it, would meet the rolling radii of the path.  The contact feels the motion
+against the rails: what changes in the columns of y and its velocity changes in those of elastic
+rails by half of the opposite each.
 """
 
 from collections.abc import Sequence
@@ -25,6 +27,7 @@ import numpy as np
 
 from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError, argument_error
+from railsim.kernels.support import RAIL_DOF
 from railsim.linear.coordinates import FreeVehicle
 from railsim.notation import ROLL, YAW, Y, Z
 
@@ -51,7 +54,8 @@ class ContactPath:
         `tangent`: its tangent matrix. Raises InputError: the contact table is narrower than the
         amplitude.
         """
-        place, velocity = vehicle.coordinates.position_of, vehicle.coordinates.velocity_of
+        c = vehicle.coordinates
+        place, velocity = c.position_of, c.velocity_of
         bodies = vehicle.system.contact.body
         columns = np.array([[place[b, k] for k in (Y, Z, ROLL)] for b in bodies])
         creeping = [
@@ -78,6 +82,11 @@ class ContactPath:
         with_y, beside = 4.0 * sines**2 / ANGLES, 4.0 * (1.0 - sines**2) / ANGLES
         for of, share, slope in zip(creeping, (with_y, beside, beside), slopes, strict=True):
             found[:, of] = np.tensordot(share, slope, 1).T
+        for w, body in enumerate(bodies):
+            rails = np.flatnonzero((c.wheelsets == w) & (c.bodies < 0))
+            for own, moved in zip((place, velocity), np.split(rails, 2), strict=True):
+                change = found[:, own[body, Y]] - tangent[:, own[body, Y]]
+                found[:, moved[:RAIL_DOF:2]] -= 0.5 * change[:, None]
         return found
 
     def _path(self, vehicle: FreeVehicle, columns: Integers, sines: Floats) -> Floats:
