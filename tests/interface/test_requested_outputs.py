@@ -159,3 +159,17 @@ def test_rails_are_displaced_each_as_the_track_says():
         expected = np.stack(sides, axis=-1).reshape(shape)
         assert np.ptp(expected, axis=-1).max() > 1e-5
         np.testing.assert_allclose(result[name], expected, atol=1e-12)
+
+
+def test_peaks_evaluated_from_the_start_have_its_first_instant():
+    """A wheelset let go 3 mm beside the middle of the track is never farther from it."""
+    settings = Settings(outputs={"evaluate_after": 0.0}).with_values(
+        {"initial": {"front.outer.wheelset": {"y": 3e-3}}}
+    )
+    result = railsim.simulate(
+        railsim.load_vehicle("coach_manchester"), railsim.load_track("straight"), speed=20.0,
+        duration=0.05, settings=settings,
+    )  # fmt: skip
+    peaks = result.groups["peaks"]
+    assert peaks["wheelset_lateral"][0, 0] == pytest.approx(3e-3, rel=1e-9)
+    assert peaks["wheelset_lateral_time"][0, 0] == 0.0

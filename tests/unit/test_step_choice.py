@@ -122,6 +122,25 @@ def test_outputs_as_dense_as_the_steps_take_one_step_each():
     assert prepare(vehicle, track, settings, 20.0, duration=1.0).steps.at(20.0) == (5e-4, 1)
 
 
+def test_a_given_step_is_too_long_for_slip_control_below_the_speed_that_chooses_it():
+    """Without a given step the one at 2 m/s is the longest that divides the output interval."""
+    drive = {"kind": "traction", "torque_table": [[0.0, 20e3]], "slip_control": [0.01, 0.03]}
+    wheels = {"bodies": ["front.frame", "front.outer.wheelset"]}
+    vehicle = load_vehicle("coach_manchester")
+    vehicle = vehicle.replace(elements={**vehicle.elements, "drive": drive | wheels})
+    track = load_track("straight")
+
+    def steps(speed, **given):
+        chosen = prepare(vehicle, track, Settings(**given), speed, duration=1.0).steps
+        return *chosen.at(speed), chosen.too_long_below
+
+    step, every, none = steps(2.0)
+    assert none == 0.0
+    assert every > 5
+    below = steps(20.0, step=step)[2]
+    assert 2.0 * (every - 1) / every < below <= 2.0
+
+
 def test_given_step_is_refused_where_it_is_unstable_and_longer_than_a_stable_one(monkeypatch):
     """Differences across a kink of the forces make a short step look unstable, too."""
 

@@ -82,6 +82,17 @@ def test_modes_in_curves_are_alike_to_both_hands_and_on_wide_circles_those_on_st
     np.testing.assert_allclose(left, right, rtol=1e-6)
 
 
+def test_hunting_of_an_amplitude_in_curves_is_alike_to_both_hands():
+    """The outer wheels climb their flanges there: the contact path has to be found closely."""
+
+    def values(hand):
+        vehicle, _ = eigenvalues(radius=600.0 * hand, cant=0.1 * hand)
+        found = eigenmodes(vehicle.linearised(SPEED, ContactPath(1e-3))).eigenvalues
+        return found[(found.imag > 1.0) & (np.abs(found) < 200.0)]
+
+    np.testing.assert_allclose(values(-1), values(1), rtol=1e-6)
+
+
 def test_harmonic_linearisation_of_a_small_amplitude_is_the_tangent_in_a_curve_too():
     vehicle, _ = eigenvalues(radius=600.0, cant=0.1)
     tangent, small = (vehicle.linearised(SPEED, path).matrix for path in (None, ContactPath(1e-6)))

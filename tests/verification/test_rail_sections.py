@@ -6,6 +6,7 @@ tests/data/sections (licence beside them).
 
 import csv
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from railsim.definitions.section_files import SectionList, read_sections
 from railsim.errors import InputError
 from railsim.kernels import table_slice as kernel
 from railsim.kernels.contact_table import G as HEIGHT
+from railsim.model import rail_ranges
 from railsim.model.assembly import assemble
 from railsim.profiles import load_profile
 from railsim.result.filters import low_passed
@@ -174,6 +176,27 @@ def test_every_table_along_a_rising_rail_lies_higher_by_its_way():
     np.testing.assert_allclose(height[own], line, atol=2e-7)
     # the first follows from the plain rail, which the range begins with
     assert height[1] - height[own][0] == pytest.approx(2e-3 * along[own][0], abs=2e-6)
+
+
+def test_sections_of_a_rail_stand_under_the_wheels_of_its_side(monkeypatch):
+    """With the profiles of wheel and plain rail there; alike for the next wheelset alone."""
+    monkeypatch.setattr(rail_ranges, "cached_section_table", lambda given: given)
+    track = load_track("crossing_56e1_r245_1in9.25")
+    both = [track.sections[0].model_copy(update={"rail": rail}) for rail in ("right", "left")]
+    track = track.replace(sections=both, rail=("rail on the left", "rail on the right"))
+    wheels = SimpleNamespace(wheelset=SimpleNamespace(profile=("left", "right")))
+    found = rail_ranges.rail_ranges(
+        SimpleNamespace(of_kind=lambda _: [wheels, wheels]),
+        track,
+        {name: name for name in (*track.rail, *wheels.wheelset.profile)},
+        (("left table", "right table"), np.array([[0, 1], [0, 1]])),
+        None,
+    )
+    assert found.which.tolist() == [[[-1, 0], [-1, 0]], [[1, -1], [1, -1]]]
+    assert [(one.wheel, one.rail, one.plain) for one in found.tables] == [
+        ("right", "rail on the right", "right table"),
+        ("left", "rail on the left", "left table"),
+    ]
 
 
 def test_a_rail_that_stands_beside_the_range_alone_has_no_tables():

@@ -9,6 +9,7 @@ from railsim.assessment.wear_depth import (
     grid,
     parts_of_step,
     rail_depth,
+    upper_side,
     wheel_dimensions,
     worn_profile,
 )
@@ -17,6 +18,7 @@ from railsim.constants import GRAVITY
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 from railsim.profiles import load_profile
+from railsim.profiles.profile import Profile
 from railsim.studies.rail_wear import rail_rows, rail_wear
 
 SETTINGS = Settings(start_state="steady")
@@ -79,6 +81,16 @@ def test_worn_rail_loses_the_area_and_nothing_below_its_head(place):
     between = 0.5 * abs(np.sum(y * np.roll(z, -1) - z * np.roll(y, -1)))
     assert between == pytest.approx(5e-7, rel=1e-4)
     assert np.min(worn.z - new.z) >= 0.0
+
+
+def test_no_wheel_reaches_the_web_of_a_rail_or_below_its_head():
+    """A head 72 mm wide on a web of 16 mm, undercut by 28 mm on both sides."""
+    web, rise = np.linspace(0.06, 0.04, 5), np.array([0.038, 0.03, 0.02, 0.01])
+    half = np.concatenate([[0.008] * 5, [0.02, 0.036, 0.0361, 0.0362]]), np.append(web, rise)
+    y = np.concatenate([-half[0], [-0.02, 0.0, 0.02], half[0][::-1]])
+    z = np.concatenate([half[1], [0.001, 0.0, 0.001], half[1][::-1]])
+    assert (y[8], y[12]) == (-0.0362, 0.0362)  # the widest points of the head
+    assert upper_side(Profile("a whole rail", "rail", y, z, "drawn")) == slice(8, 13)
 
 
 def test_a_wrong_step_is_named_as_tonnage():
