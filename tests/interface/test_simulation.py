@@ -61,6 +61,18 @@ def test_the_bits_of_simulate(coach, track, dt):
     assert stepped.attributes["steps"] == whole.attributes["steps"]
 
 
+def test_calls_that_end_within_a_step_change_nothing_of_what_steps_remember(coach, track):
+    """Such as the vibrations of wheel loads from step to step, which end in a remark."""
+    remembered = []
+    for dt in (5 * STEP, 0.3 * STEP):
+        with railsim.Simulation(coach, track, speed=20.0, until=2.0, settings=DISTURBED) as sim:
+            while sim.time < 20.0 * STEP - 1e-9:
+                sim.step(min(dt, 20.0 * STEP - sim.time))
+            remembered.append(sim.state.counted)
+    for whole, parts in zip(*remembered, strict=True):
+        np.testing.assert_array_equal(parts, whole)
+
+
 @pytest.mark.parametrize("dt", [3 * STEP, 5 * STEP, 11 * STEP])
 def test_the_bits_of_simulate_where_the_recorder_is_full_between_two_outputs(
     coach, track, dt, monkeypatch

@@ -258,6 +258,16 @@ def in_series():
     return Vehicle.model_validate(vehicle)
 
 
+def test_bounds_and_spread_of_a_parameter_stand_behind_its_key():
+    """Factors below and above 1, and the share to which it is known; a key alone has no spread."""
+    alone, bounded, known = parsed(
+        [PRIMARY, f"{MASS}:0.7:1.2", f"{DAMPER}:0.5:2:0.2"], quarter(), TRACK
+    )
+    assert alone.spread is bounded.spread is None
+    assert (bounded.low, bounded.high) == (0.7, 1.2)
+    assert (known.low, known.high, known.spread) == (0.5, 2.0, 0.2)
+
+
 def test_a_combination_that_nothing_shows_is_said_in_words():
     """Two springs in series: k = k1 k2/(k1 + k2), d ln k = (k2 d ln k1 + k1 d ln k2)/(k1 + k2)."""
     vehicle = in_series()
