@@ -11,6 +11,7 @@ from dynamics import load_track, load_vehicle
 from selection import points
 
 import railsim
+from railsim.contact import contact_geometry
 from railsim.errors import ModelError
 from railsim.kernels.support import LEARNT
 from railsim.linear.eigenmodes import eigenmodes
@@ -20,6 +21,7 @@ from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.equilibrium import tracks_under
 from railsim.plot.stability import bifurcation_figure
+from railsim.profiles import load_profile
 from railsim.stability import continuation, vehicle_flow
 from railsim.stability import motion as motion_of
 from railsim.stability.branches import THRESHOLD, Branch, Limit, Point, first_beyond, lowest_of
@@ -696,12 +698,19 @@ def test_a_limit_that_is_not_reached_is_said_so():
 
 
 def test_critical_speed_over_amplitude_and_its_smallest():
-    """Conicity falls with the amplitude from 0.3 mm on (EN 15302), so that the speed rises."""
+    """The speed rises from 0.3 mm to 4 mm, where the rigid conicity falls; at 5 mm that rises."""
     found = critical_speed(load_vehicle("coach_manchester"), RIGID, methods=("linear",))
     line = found.linear_over_amplitude
     assert line.amplitude[0] == 0.1e-3
     assert line.amplitude[-1] == 6e-3
-    assert np.all(np.diff(line.speed) > 0.0)
+    (first,) = np.flatnonzero(np.isclose(line.amplitude, 0.3e-3))
+    (end,) = np.flatnonzero(np.isclose(line.amplitude, 5e-3))
+    conicity = contact_geometry(
+        load_profile("S1002"), load_profile("60E1"), inclination=RIGID.inclination
+    ).equivalent_conicity(line.amplitude)
+    between = slice(first, end + 1)
+    rises = np.diff(line.speed[between]) > 0.0
+    assert rises.tolist() == (np.diff(conicity[between]) < 0.0).tolist() == [*5 * [True], False]
     assert line.smallest[0] == min(line.speed)
     assert line.speed[0] == pytest.approx(found.linear.speed, rel=0.03)
 
