@@ -84,9 +84,9 @@ class ContactPath:
             found[:, of] = np.tensordot(share, slope, 1).T
         for w, body in enumerate(bodies):
             rails = np.flatnonzero((c.wheelsets == w) & (c.bodies < 0))
-            for own, moved in zip((place, velocity), np.split(rails, 2), strict=True):
+            for own, felt in zip((place, velocity), np.split(rails, 2), strict=True):
                 change = found[:, own[body, Y]] - tangent[:, own[body, Y]]
-                found[:, moved[:RAIL_DOF:2]] -= 0.5 * change[:, None]
+                found[:, felt[:RAIL_DOF:2]] -= 0.5 * change[:, None]
         return found
 
     def _path(self, vehicle: FreeVehicle, columns: Integers, sines: Floats) -> Floats:
