@@ -12,7 +12,23 @@ from railsim.kernels import compiled
 from railsim.kernels.branches import rarely
 from railsim.kernels.internal import constant_decays
 from railsim.kernels.rail_parts import near_range
-from railsim.kernels.system import AHEAD, AT_SECTIONS, DIVIDED, LOCATED, PARTS, PER_PART, SHARE
+from railsim.kernels.state import LAST_STEP
+from railsim.kernels.system import (
+    AHEAD,
+    AT_SECTIONS,
+    DIVIDED,
+    IMPLICIT,
+    LOCATED,
+    PARTS,
+    PER_PART,
+    SHARE,
+)
+
+# Long steps on rigid rails are stable by the stiffness of the contacts, implicit over the last step:
+# behind a short one they are not, and changes between both feed a wheel that rings.  There steps are
+# at most LONGER times the last one, and divided until forces change by RINGS times `PER_PART` only.
+LONGER, RINGS = 2.0, 0.5
+WHOLE = 1.0 - 1e-9  # against round-off
 
 
 @compiled(python=False)
@@ -36,15 +52,19 @@ def striking(system, work, state, h):
         share in one of them, as far as parts may be as short.
     """
     contact, most, change = system.contact, work.parts[PARTS], work.watch[SHARE]
-    where = -1
+    where, least = -1, 2.0
     if most > 0:
+        last = abs(state[LAST_STEP])
+        if work.watch[IMPLICIT] > 0.0 and 0.0 < last < h * WHOLE and not system.support.elastic:
+            change, least = RINGS * work.watch[PER_PART], ceil(h / (LONGER * last) * WHOLE)
+            where, least = (0, min(least, float(most))) if least > 1.0 else (-1, 2.0)
         for w in range(contact.body.shape[0]):
             own = work.force_rate[w] * h / contact.load[w]
             if rarely(contact.rails.range_row.shape[0] > 0) and near_range(system, state, w):
                 own *= work.watch[AT_SECTIONS]
             if own > change:
                 where, change = w, own
-    return where, np.int64(ceil(min(change / work.watch[PER_PART], float(most))))
+    return where, np.int64(max(least, ceil(min(change / work.watch[PER_PART], float(most)))))
 
 
 @compiled(python=False)
