@@ -24,9 +24,9 @@ from railsim.kernels.system import (
     SHARE,
 )
 
-# Long steps on rigid rails are stable by the stiffness of the contacts, implicit over the last step:
-# behind a short one they are not, and changes between both feed a wheel that rings.  There steps are
-# at most LONGER times the last one, and divided until forces change by RINGS times `PER_PART` only.
+# Long steps on rigid rails are stable by the stiffness of the contacts, implicit over the last step.
+# Behind a short one they are not, and changes between both feed a wheel that rings: steps are at
+# most LONGER times the last one, and divided until forces change by RINGS times `PER_PART` only.
 LONGER, RINGS = 2.0, 0.5
 WHOLE = 1.0 - 1e-9  # against round-off
 

@@ -24,7 +24,7 @@ from railsim.linear.sliding import Placed, SlidingPath, has_pads
 from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
-from railsim.model.work import level_track
+from railsim.model.work import level_track, without_loads
 from railsim.track.tables import track_tables
 
 WALKING_PACE = 1.0  # m/s
@@ -51,7 +51,7 @@ class Standing:
 def on_cant(balance: Equilibrium, track: Track, cant: float, *, held: bool = False) -> Standing:
     """Return the vehicle standing on canted straight track [m]; `held`: its wheelsets."""
     model, start = balance.model, placed(balance.state)
-    system = model.system._replace(track=track_tables(circle(track, cant=cant)))
+    system = without_loads(model.system)._replace(track=track_tables(circle(track, cant=cant)))
     solver = SteadyRolling(model, system, held=held)
     state = solver.solve(start, WALKING_PACE)
     solver.evaluate(state)
@@ -193,7 +193,7 @@ def _placing(
 
         def rolling(share: float, state: Floats) -> tuple[System, Floats]:
             curve = circle(track, curvature=share * curvature)
-            system = model.system._replace(track=track_tables(curve))
+            system = without_loads(model.system)._replace(track=track_tables(curve))
             return _twisted(system, share * heights), state
 
         return rolling

@@ -26,7 +26,7 @@ from railsim.kernels.system import AXLEBOX, WHEELSET, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import conditions, difference_quotients
-from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
+from railsim.model.work import CONSTANT_SPEED, work_arrays
 
 RESIDUAL = 1e-7  # largest acceleration left (m/s2, rad/s2)
 GOOD_ENOUGH = 1e-5  # the same where rounding and the cells of the creep law let it be no smaller
@@ -42,6 +42,8 @@ class NotConverged(ModelError):
 class SteadyRolling:
     """Newton's method for one vehicle on one track of constant curvature and cant.
 
+    Given forces and torques of the system have to be constant.
+
     `held`: whether the wheelsets stay where the guess has them; `accelerated`: whether the speed V
     changes by the system's drive, with all that rolls: spin rates are then proportional to V.
     """
@@ -50,9 +52,7 @@ class SteadyRolling:
         self, model: Model, system: System, *, held: bool = False, accelerated: bool = False
     ) -> None:
         self.model = model
-        self.system = without_loads(system)
-        if not accelerated:
-            self.system = self.system._replace(drive=CONSTANT_SPEED)
+        self.system = system if accelerated else system._replace(drive=CONSTANT_SPEED)
         self.work = work_arrays(system)
         self.patches = 0  # loaded ones, of the last evaluation
         self._unknowns, self._equations, self._inertias = conditions(model, system, held=held)

@@ -8,7 +8,7 @@ third of the time of settling.  Friction elements hold what the way left in them
 where Newton's method finds nothing, the vehicle settles over a long way.
 
 On straight track wheels with hollow treads have further states of rest beside the middle, some of
-them in flange contact.
+them in flange contact, and given forces press vehicles aside.
 """
 
 import math
@@ -24,7 +24,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.kernels.contact_columns import W_Q
 from railsim.kernels.internal import PAD
-from railsim.kernels.state import ARC_LENGTH, LAST_STEP, SPEED
+from railsim.kernels.state import ARC_LENGTH, LAST_STEP, SPEED, TIME
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import DOF
 from railsim.kernels.system import System
@@ -128,11 +128,42 @@ def off_centre(model: Model, track: Track, system: System, rolling: Floats) -> l
                     positions[body, [Z, ROLL]] += shape.centre_z[k], shape.roll[k]
             with suppress(NotConverged):  # then from another place, or the others decide alone
                 state = SteadyRolling(model, system).solve(guess, float(rolling[SPEED]))
-                moved = (state - rolling)[: 6 * model.index.n_bodies].reshape(-1, 6)
-                if np.abs(moved[system.contact.body, Y]).max() > LEAST_ASIDE:
+                if _aside(model, state, rolling):
                     found.append((system, state))
                     break
     return found
+
+
+def pushed(model: Model, system: System, rolling: Floats, step: float) -> list[Situation]:
+    """State of rest under the given forces and torques, each at its largest, if they push aside.
+
+    `system`, `rolling`: of steady rolling on straight track, without any; `step`: stable there.
+    """
+    loads = model.system.loads
+    if not len(loads.body):
+        return []
+    ends = zip(loads.start[:-1], loads.start[1:], strict=True)
+    rows = [max(loads.table[i:j], key=lambda row: np.abs(row[1:]).max()) for i, j in ends]
+    state = rolling.copy()
+
+    def rising(begin: float) -> System:
+        table = [[(begin, 0.0, 0.0, 0.0), (begin + TIMES[0], *row[1:])] for row in rows]
+        start, over_time = 2 * np.arange(len(rows) + 1), loads.flags * np.array([1, 1, 0])
+        given = loads._replace(start=start, table=np.reshape(table, (-1, 4)), flags=over_time)
+        return system._replace(loads=given)
+
+    if not _advanced(model, rising(state[TIME]), state, 0.25 * step, sum(TIMES)):
+        return []
+    constant = rising(rolling[TIME] - TIMES[0])
+    with suppress(NotConverged):  # then where the vehicle is at the end of the time
+        state = _at_rest(model, constant, state, rolling)
+    return [(constant, state)] if _aside(model, state, rolling) else []
+
+
+def _aside(model: Model, state: Floats, rolling: Floats) -> bool:
+    """Whether a state of rest is another one than the middle."""
+    moved = (state - rolling)[: 6 * model.index.n_bodies].reshape(-1, 6)
+    return bool(np.abs(moved[model.system.contact.body, Y]).max() > LEAST_ASIDE)
 
 
 def _symmetric(model: Model, track: Track, rolling: Floats) -> bool:
@@ -233,13 +264,25 @@ def _brought(
     auxiliary = curve_to_settle_in(model, track, speed, *curve, friction, times, *lengths)
     tables = track_tables(auxiliary)._replace(has_irregularity=uneven_rigid_rails(system))
     smooth = without_loads(system)._replace(track=tables, drive=CONSTANT_SPEED)
-    contact = smooth.contact
-    damped = smooth._replace(contact=contact._replace(damping=MORE_DAMPING * contact.damping))
     state = rolling.copy()
-    steps = math.floor(auxiliary.length / speed / step)
-    status = advance(model, damped, state, step, steps, FAST, progress)
+    time = auxiliary.length / speed
+    return (smooth, state) if _advanced(model, smooth, state, step, time, progress) else None
+
+
+def _advanced(
+    model: Model,
+    system: System,
+    state: Floats,
+    step: float,
+    time: float,
+    progress: Progress | None = None,
+) -> bool:
+    """Advance a state with more contact damping; return whether the vehicle stays on the rails."""
+    contact = system.contact
+    damped = system._replace(contact=contact._replace(damping=MORE_DAMPING * contact.damping))
+    status = advance(model, damped, state, step, math.floor(time / step), FAST, progress)
     state[LAST_STEP] = 0.0  # of the last step's length: steps of any length are judged from here
-    return (smooth, state) if status == RUNNING else None
+    return status == RUNNING
 
 
 def _at_rest(model: Model, system: System, state: Floats, rolling: Floats) -> Floats:

@@ -163,7 +163,9 @@ def _standing(
     there = _inclined(circle(track, at=s), track, s)
     if drive.mode == TABLE:
         drive = drive._replace(table=drive.table + np.array([POSITION - s, 0.0]))
-    system = _supported(model.system, s)._replace(track=track_tables(there), drive=drive)
+    system = _supported(without_loads(model.system), s)._replace(
+        track=track_tables(there), drive=drive
+    )
     speed = float(balance.state[SPEED])
     try:
         solver = SteadyRolling(model, system, accelerated=accelerated)
@@ -380,7 +382,8 @@ def _steady(
         )
         return None
     speed, friction = float(balance.state[SPEED]), _friction(track, start)
-    level = _guided(_supported(model.system, start), standing_at(model.check, start))
+    there = _supported(without_loads(model.system), start)
+    level = _guided(there, standing_at(model.check, start))
 
     def along(share: float) -> tuple[System, float]:
         part = circle(track, curvature=share * curvature, cant=share * cant, friction=friction)

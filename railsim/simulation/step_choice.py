@@ -44,6 +44,7 @@ from railsim.simulation.flange import (
     in_flange_contact,
     narrowed,
     off_centre,
+    pushed,
 )
 from railsim.track.irregularity import shortest_wave
 
@@ -150,7 +151,7 @@ class StepChoice:
     def _stable(self, speed: float, interval: float) -> float:
         """Longest stable step at a speed that divides the output interval."""
         own = self._stability(self._model, speed, self._states.get(speed))
-        by_class = True
+        by_class = not len(self._model.system.loads.body)  # under which friction decides
 
         def holds(step: float) -> bool:
             nonlocal by_class
@@ -235,7 +236,8 @@ class StepChoice:
         def curving(step: float) -> list[tuple[Situation, float]]:
             found = []
             begun = in_flange_contact(model, self._track, rolling, step, self._progress)
-            for at in (*begun, *off_centre(model, self._track, level, rolling)):
+            aside = off_centre(model, self._track, level, rolling)
+            for at in (*begun, *aside, *pushed(model, level, rolling, step)):
                 found.append((at, 1.0))
                 where = model, self._track, at
                 for place in (at, *guided(*where), *narrowed(*where)):
