@@ -24,7 +24,7 @@ from railsim.kernels.system import (
     SHARE,
 )
 
-# Long steps on rigid rails are stable by the stiffness of the contacts, implicit over the last step.
+# Long steps on rigid rails are stable by the contacts' stiffness, implicit over the last step.
 # Behind a short one they are not, and changes between both feed a wheel that rings: steps are at
 # most LONGER times the last one, and divided until forces change by RINGS times `PER_PART` only.
 LONGER, RINGS = 2.0, 0.5
