@@ -39,7 +39,7 @@ def peak_values(result):
 
 @pytest.mark.parametrize("vehicle", ["coach_manchester", "metro_b_trailer"])
 def test_wheels_that_ring_come_to_rest_on_smooth_rails(vehicle):
-    """The contact damps by 1/e in some 10 ms; at 1.67 ms divided steps kept 16 % of Q0 going."""
+    """The contact damps by 1/e in some 10 ms; at 1.67 ms divided steps kept it ringing."""
     dropped = {name: {"z": 1e-4} for name in ("front.outer.wheelset", "rear.inner.wheelset")}
     vehicle, track = load_vehicle(vehicle), load_track("straight")
     result = simulate(vehicle, track, speed=20.0, until=20.0, settings=Settings(initial=dropped))
