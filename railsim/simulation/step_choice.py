@@ -236,8 +236,10 @@ class StepChoice:
         def curving(step: float) -> list[tuple[Situation, float]]:
             found = []
             begun = in_flange_contact(model, self._track, rolling, step, self._progress)
-            aside = off_centre(model, self._track, level, rolling)
-            for at in (*begun, *aside, *pushed(model, level, rolling, step)):
+            begun += off_centre(model, self._track, level, rolling)
+            if self._settings.step is None:  # loads may be short: a step that is asked for is taken
+                begun += pushed(model, level, rolling, step)
+            for at in begun:
                 found.append((at, 1.0))
                 where = model, self._track, at
                 for place in (at, *guided(*where), *narrowed(*where)):

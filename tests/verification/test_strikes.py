@@ -81,13 +81,16 @@ def test_peaks_do_not_depend_on_the_output_rate():
 
 
 def test_few_steps_are_divided_where_nothing_strikes():
-    """None in a smooth curve; on rough rails, where wheel loads swing, some per cent."""
+    """None in a smooth curve; on rough rigid rails, where wheel loads swing, a fifth of them.
+
+    Behind parts of a step the steps at most double, so each blow takes some four of 1.67 ms.
+    """
     coach = load_vehicle("coach_manchester")
     rough = load_track("straight").replace(
         irregularities=[{"type": "random", "spectrum": "erri_b176_low", "seed": 1}]
     )
     curve = load_track("curve_r250")
-    for track, speed, until, share in ((curve, 20.0, 400.0, 0.0), (rough, 40.0, 150.0, 0.1)):
+    for track, speed, until, share in ((curve, 20.0, 400.0, 0.0), (rough, 40.0, 150.0, 0.2)):
         result = simulate(coach, track, speed=speed, until=until)
         steps = result.time[-1] / result.attributes["step"]
         assert result.attributes["steps_divided"] <= share * steps
