@@ -199,5 +199,7 @@ def pytest_collection_modifyitems(config, items):
         names[name].add_marker(pytest.mark.further)
     files = {name.partition("::")[0] for name in names}
     missing = [name for name in LONG - names.keys() if name.partition("::")[0] in files]
-    if missing and not any("::" in argument for argument in config.args):
+    # of a file in which tests failed only these are collected again
+    part = config.getoption("lf", False) or any("::" in argument for argument in config.args)
+    if missing and not part:
         raise pytest.UsageError(f"tests/selection.py names what is no test: {missing}")

@@ -114,7 +114,7 @@ class Run:
         self.derivative = np.zeros_like(self.state)
         self.stages = np.zeros((3, len(self.state)))
         # whether nothing was before the state
-        self.fresh = prepared.fresh and prepared.state[LAST_STEP] == 0.0
+        self.fresh = prepared.fresh and not prepared.state[LAST_STEP]
         self.evaluates = bool(self.state[TIME] >= prepared.evaluation - ROUND_OFF)
         self.varies = prepared.steps.varies
         # equal steps of distance while the speed changes: the last step of an interval ends there
