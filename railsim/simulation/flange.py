@@ -37,6 +37,7 @@ from railsim.model.equilibrium import tracks_under
 from railsim.model.time_step import Situation, empty_recorder, observed
 from railsim.model.work import CONSTANT_SPEED, uneven_rigid_rails, without_loads
 from railsim.notation import ROLL, YAW, Y, Z
+from railsim.profiles.profile import Profile
 from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import alignment_of
 from railsim.track.tables import track_tables
@@ -54,6 +55,7 @@ BEGIN = 2.0
 # reached also where the wheelset would vibrate.
 MORE_DAMPING = 4.0
 ASIDE = (5e-3, 4e-3, 3e-3)  # m, where a vehicle on hollow treads is set down, until one stays aside
+TREAD, HOLLOW = 0.04, 2e-5  # m, half its width, least rise of a hollow one
 LEAST_ASIDE = 1e-3  # m, of wheelsets of a state of rest that is another one than the middle
 
 
@@ -108,16 +110,14 @@ def in_flange_contact(
 def off_centre(model: Model, track: Track, system: System, rolling: Floats) -> list[Situation]:
     """States of rest beside the middle of straight track, as vehicles on hollow treads have.
 
-    Sought where the wheel that is nearer to its rail has the smaller rolling radius somewhere.
     `system`, `rolling`: of steady rolling on straight track.
     """
     wheelsets = [body.wheelset for body in model.flat.of_kind("wheelset") if body.wheelset]
+    if not any(_is_hollow(model.profiles[name]) for each in wheelsets for name in each.profile):
+        return []
     shapes = [geometry_of(wheelset, track, model.profiles) for wheelset in wheelsets]
     found = []
     for side in (1.0,) if _symmetric(model, track, rolling) else (1.0, -1.0):
-        fitting = [shape for shape in shapes if shape is not None]
-        if not any((side * s.delta_r[side * s.lateral > 0.0] < 0.0).any() for s in fitting):
-            continue
         for aside in ASIDE:
             guess = rolling.copy()
             positions = guess[: 6 * model.index.n_bodies].reshape(-1, 6)
@@ -132,6 +132,12 @@ def off_centre(model: Model, track: Track, system: System, rolling: Floats) -> l
                     found.append((system, state))
                     break
     return found
+
+
+def _is_hollow(wheel: Profile) -> bool:
+    """Whether its radius rises again towards the field side on the tread."""
+    tread = wheel.z[np.abs(wheel.y) < TREAD]
+    return bool(np.max(tread - np.minimum.accumulate(tread)) > HOLLOW)
 
 
 def pushed(model: Model, system: System, rolling: Floats, step: float) -> list[Situation]:
