@@ -43,7 +43,8 @@ def prepare_steps(system, work, h):
 def striking(system, work, state, h):
     """Wheelset with the contact force that is about to change most, beyond a share of the load.
 
-    There wheels lift, strike, or ring afterwards; -1 where nothing does, or no step is divided.
+    There wheels lift, strike, or ring afterwards; -1 where nothing does, or no step is divided; 0
+    too behind a short part of a long step on rigid rails, see `LONGER`.
 
     Returns
     -------
@@ -52,12 +53,13 @@ def striking(system, work, state, h):
         share in one of them, as far as parts may be as short.
     """
     contact, most, change = system.contact, work.parts[PARTS], work.watch[SHARE]
-    where, least = -1, 2.0
+    where, least = -1, 2.0  # fewer than two parts are no division
     if most > 0:
         last = abs(state[LAST_STEP])
         if work.watch[IMPLICIT] > 0.0 and 0.0 < last < h * WHOLE and not system.support.elastic:
-            change, least = RINGS * work.watch[PER_PART], ceil(h / (LONGER * last) * WHOLE)
-            where, least = (0, min(least, float(most))) if least > 1.0 else (-1, 2.0)
+            change, times = RINGS * work.watch[PER_PART], ceil(h / (LONGER * last) * WHOLE)
+            if times > 1.0:  # whatever the forces do
+                where, least = 0, min(times, float(most))
         for w in range(contact.body.shape[0]):
             own = work.force_rate[w] * h / contact.load[w]
             if rarely(contact.rails.range_row.shape[0] > 0) and near_range(system, state, w):
