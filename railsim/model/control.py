@@ -113,7 +113,7 @@ class _Wiring:
                 np.array([one.period for one in controllers.values()], float),
                 np.array(self._wires, np.int64),
             ),
-            own=self._blocks.own(),
+            own=self._blocks.as_arrays(),
             actuators=self._model.system.actuators._replace(which=self._acts),
         )
         index = replace(self._model.index, signals=tuple(signals), controllers=tuple(controllers))
@@ -129,7 +129,7 @@ class _Wiring:
     def _signal(self, name: str, signal: Signal) -> tuple[list[int], list[float]]:
         """Row of a signal: what it is, and how it is sampled."""
         arm = (0.0, 0.0, 0.0)
-        kind, of, group, component = self._measured(f"signals.{name}", signal)
+        kind, of, group, component = self._measured_signal(f"signals.{name}", signal)
         if signal.position is not None and signal.quantity in OF_BODY:
             centre = self._model.flat.bodies[of].position
             arm = tuple(np.subtract(signal.position, centre).tolist())
@@ -142,7 +142,7 @@ class _Wiring:
         how = (period, signal.delay, signal.noise, signal.resolution, signal.ahead)
         return [kind, of, group, component, base, slots], [*arm, *how]
 
-    def _measured(self, key: str, signal: Signal) -> tuple[int, int, int, int]:
+    def _measured_signal(self, key: str, signal: Signal) -> tuple[int, int, int, int]:
         """Kind, body or element or wheelset, group or side, and component of a signal."""
         index, quantity = self._model.index, signal.quantity
         axis = COMPONENTS.index(signal.axis) if signal.axis else 0

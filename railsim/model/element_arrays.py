@@ -104,7 +104,7 @@ class LawBlocks:
             self.address.append(bound.address)
         return self.address.index(bound.address)
 
-    def own(self) -> Own:
+    def as_arrays(self) -> Own:
         """As arrays."""
         return Own(
             places=np.array(self.address, dtype=np.int64), memory=np.array(self.memory, dtype=float)
@@ -285,7 +285,7 @@ class ElementArrays:
                 **_columns(self.act_rows, np.int64, body=(2,), which=(acts.WHICH_SIZE,)),
                 **_columns(self.act_rows, float, row=(acts.ROW_SIZE,)),
             ),
-            "own": self.own.own(),
+            "own": self.own.as_arrays(),
         }
 
     def _mounts(self) -> Mounts:

@@ -36,7 +36,7 @@ from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT, OMEGA
 from railsim.model.assembly import Model
 from railsim.model.preloads import least_squares, with_preloads, with_these_preloads
 from railsim.model.solutions import solution
-from railsim.model.time_step import empty_recorder, observed
+from railsim.model.time_step import empty_recorder, record_state
 from railsim.model.work import components_of, level_track, work_arrays
 from railsim.notation import ROLL, SIDES, YAW, Z
 
@@ -149,7 +149,7 @@ def _let_down(model: Model) -> tuple[Model, Floats, tuple[str, ...]]:
         model = with_preloads(model)
         return model, _first_guess(model, level_track(model.system)), ()
     try:
-        released = with_preloads(_released(model))
+        released = with_preloads(_release_elements(model))
         level = level_track(released.system)
         balance = _Balance(released, level, speed=1.0, rolling=False)
         guess = balance.solve(_first_guess(released, level))
@@ -167,12 +167,12 @@ def _let_down(model: Model) -> tuple[Model, Floats, tuple[str, ...]]:
         return model, guess, (remark,)
 
 
-def _released(model: Model) -> Model:
+def _release_elements(model: Model) -> Model:
     """Return the model with all fixed bodies let loose."""
     bodies = model.system.bodies
     kind = np.where(bodies.kind == FIXED, RIGID, bodies.kind)
     bodies = bodies._replace(kind=kind, fixed=bodies.fixed[:0])
-    design = None if model.design is None else _released(model.design)
+    design = None if model.design is None else _release_elements(model.design)
     return replace(model, system=model.system._replace(bodies=bodies), design=design)
 
 
@@ -386,7 +386,7 @@ class _Balance:
         deflections, patches = [], []
         for each in (state, after):
             recorder = empty_recorder(self.model, 1, chosen, patches=True)
-            if observed(system, each, recorder) != RUNNING:
+            if record_state(system, each, recorder) != RUNNING:
                 return []
             deflections.append(recorder.element[0, :, DEFLECTION : DEFLECTION + 3])
             patches.append(recorder.patch[0, :, :, :, NORMAL] > 0.0)

@@ -118,7 +118,7 @@ def gauge_remarks(flat: FlatVehicle, track: Track) -> list[Remark]:
                 f"{1e3 * track.gauge:g} mm; railways have {1e3 * low:g} to {1e3 * high:g} mm"
             )
             texts.setdefault(text, []).append(body.name)
-    return [gathered(text, names) for text, names in texts.items()]
+    return [one_remark(text, names) for text, names in texts.items()]
 
 
 def narrow_remarks(model: "Model", gauge: float) -> list[Remark]:
@@ -136,7 +136,7 @@ def narrow_remarks(model: "Model", gauge: float) -> list[Remark]:
                 f"apart at s = {tables.s_start + k * tables.ds:.1f} m: it wedges between them"
             )
             texts.setdefault(text, []).append(body.name)
-    return [gathered(text, names) for text, names in texts.items()]
+    return [one_remark(text, names) for text, names in texts.items()]
 
 
 def flangeway_remarks(model: "Model", track: Track) -> list[Remark]:
@@ -157,7 +157,7 @@ def flangeway_remarks(model: "Model", track: Track) -> list[Remark]:
             text += f"check_rail.{i} and {k} are {1e3 * apart:.1f} mm apart: it wedges on them"
             if a.rail != b.rail and apart > wheelset.back_to_back:
                 texts.setdefault(text, []).append(body.name)
-    return [gathered(text, names) for text, names in texts.items()]
+    return [one_remark(text, names) for text, names in texts.items()]
 
 
 def _narrowest(a: CheckRail, b: CheckRail) -> float:
@@ -168,18 +168,18 @@ def _narrowest(a: CheckRail, b: CheckRail) -> float:
     return float(np.min(np.interp(s, s_a, of_a) + np.interp(s, s_b, of_b), initial=np.inf))
 
 
-def profile_remarks(model: "Model", given: Iterable[str] | None = None) -> tuple[str, ...]:
+def profile_remarks(model: "Model", known: Iterable[str] | None = None) -> tuple[str, ...]:
     """Remarks on what was recognised and corrected in profiles, but for those `given` as such."""
     return tuple(
         f"Profile {name}: {'; '.join(profile.notes)}."
         for name, profile in model.profiles.items()
-        if profile.notes and name not in (given or ())
+        if profile.notes and name not in (known or ())
     )
 
 
-def gathered(what: str, names: Sequence[str]) -> Remark:
+def one_remark(text: str, names: Sequence[str]) -> Remark:
     """Return one remark for several parts with the same finding, the first ones by name."""
-    return Remark(listed(names), what)
+    return Remark(listed(names), text)
 
 
 def _below_the_rails(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterator[Remark]:
@@ -190,14 +190,14 @@ def _below_the_rails(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -
     if names:
         low = max(heights.values())
         text = f"below the rails, z up to {low:g} m: z points down, a height of 1 m is z = -1"
-        yield gathered(text, names)
+        yield one_remark(text, names)
 
 
 def _heights(flat: FlatVehicle) -> Iterator[Remark]:
     heights = {b.name: -b.position[2] for b in flat.bodies if HEIGHT < -b.position[2] <= LONGEST}
     if heights:
         text = f"up to {max(heights.values()):g} m above the rails: is its position in m?"
-        yield gathered(text, [*heights])
+        yield one_remark(text, [*heights])
 
 
 def _lengths(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterator[Remark]:
@@ -207,11 +207,13 @@ def _lengths(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterat
     far |= {name: max(map(abs, point)) for name, point in points.items()}
     names = [name for name, most in far.items() if most > LONGEST]
     if names:
-        yield gathered(f"up to {max(far.values()):g} m from the origin: are lengths in m?", names)
+        yield one_remark(f"up to {max(far.values()):g} m from the origin: are lengths in m?", names)
     travels = {e.name: _travel(e.definition) for e in flat.elements}
     names = [name for name, most in travels.items() if most > TRAVEL]
     if names:
-        yield gathered(f"no force before {max(travels.values()):g} m of travel: is it in m?", names)
+        yield one_remark(
+            f"no force before {max(travels.values()):g} m of travel: is it in m?", names
+        )
     low, high = WHEEL_RADIUS
     usual = f"railways have {low:g} to {high:g} m"
     texts: dict[str, list[str]] = {}
@@ -226,7 +228,7 @@ def _lengths(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterat
             text = f"back_to_back {backs:g} m, usual is at most {BACK_TO_BACK:g} m"
             texts.setdefault(text, []).append(body.name)
     for text, parts in texts.items():
-        yield gathered(f"{text}: is it in m?", list(dict.fromkeys(parts)))
+        yield one_remark(f"{text}: is it in m?", list(dict.fromkeys(parts)))
 
 
 def _travel(element: Element) -> float:
@@ -258,17 +260,17 @@ def _inertias(flat: FlatVehicle) -> Iterator[Remark]:
     ]
     if names:
         text = "a moment of inertia is above the sum of the other two"
-        yield gathered(f"{text}: Ixx, Iyy, Izz in this order?", names)
+        yield one_remark(f"{text}: Ixx, Iyy, Izz in this order?", names)
     axles = [b.name for b in flat.of_kind("wheelset") if b.inertia[1] > min(b.inertia)]
     if axles:
         text = "the moment of inertia about the axle is not the smallest"
-        yield gathered(f"{text}: Ixx, Iyy, Izz in this order?", axles)
+        yield one_remark(f"{text}: Ixx, Iyy, Izz in this order?", axles)
     low, high = GYRATION
     radii = {b.name: np.sqrt(np.array(b.inertia) / b.mass) for b in flat.bodies if b.mass > 0.0}
     odd = {k: r[(r < low) | (r > high)] for k, r in radii.items()}
     if names := [name for name, r in odd.items() if len(r)]:
         text = f"radius of gyration {odd[names[0]][0]:.3g} m, railways have {low:g} to {high:g} m"
-        yield gathered(f"{text}: is the mass in kg, the inertia in kg m2?", names)
+        yield one_remark(f"{text}: is the mass in kg, the inertia in kg m2?", names)
 
 
 def _coefficients(flat: FlatVehicle) -> Iterator[tuple[str, FlatElement]]:
@@ -359,13 +361,13 @@ Supports = Sequence[tuple[FlatElement, float]]
 """Springs that carry weight, with their compression at rest [N]."""
 
 
-def _by_text(found: Iterable[tuple[str, FlatElement]]) -> Iterator[Remark]:
+def _by_text(elements_by_text: Iterable[tuple[str, FlatElement]]) -> Iterator[Remark]:
     """Remarks on elements, those with the same text as one."""
     names: dict[str, list[str]] = {}
-    for text, element in found:
+    for text, element in elements_by_text:
         names.setdefault(text, []).append(element.name)
     for text, parts in names.items():
-        yield gathered(text, parts)
+        yield one_remark(text, parts)
 
 
 def _pulling(flat: FlatVehicle) -> Iterator[tuple[str, FlatElement]]:
@@ -387,32 +389,32 @@ def _pulling(flat: FlatVehicle) -> Iterator[tuple[str, FlatElement]]:
             )
 
 
-def _supports(vehicle: Vehicle, balanced: "Model | None") -> Iterator[Remark]:
+def _supports(vehicle: Vehicle, equilibrium: "Model | None") -> Iterator[Remark]:
     """Remarks on how the springs share the weight at rest."""
     from railsim.model.assembly import without_rails
     from railsim.model.preloads import static_shares
 
     # whether the preloads of a model with preloads carry it in its nominal position
-    solved = balanced is not None and not (
-        balanced.design or any(e.definition.has_free_length for e in balanced.flat.elements)
+    solved = equilibrium is not None and not (
+        equilibrium.design or any(e.definition.has_free_length for e in equilibrium.flat.elements)
     )
     try:
-        model = balanced or without_rails(vehicle)
+        model = equilibrium or without_rails(vehicle)
         shares = static_shares(model, solved=solved)
     except ModelError as error:
         yield Remark("elements", str(error))
         return
     parts = {element.name: element for element in model.flat.elements}
     supports = [(parts[name], force) for name, force in shares.items() if name in parts]
-    yield from _pulled(model.flat, supports)
+    yield from _in_tension(model.flat, supports)
     # pads that only press, and would have to pull for the vehicle to stand as it is drawn
     idle = [e.name for e, load in supports if isinstance(e.definition, SideBearer) and load <= 0.0]
     if idle:
-        yield gathered("carries nothing at rest, it would have to pull", idle)
+        yield one_remark("carries nothing at rest, it would have to pull", idle)
     yield from _by_text(_other_loads(supports))
 
 
-def _pulled(flat: FlatVehicle, supports: Supports) -> Iterator[Remark]:
+def _in_tension(flat: FlatVehicle, supports: Supports) -> Iterator[Remark]:
     kinds = {body.name: body.kind for body in flat.bodies}
     pulled = {e.name: -load for e, load in supports if load < -1.0 and _from_below(e, kinds)}
     if pulled:
@@ -420,7 +422,7 @@ def _pulled(flat: FlatVehicle, supports: Supports) -> Iterator[Remark]:
         text = (
             f"in tension at rest, up to {most:.3g} kN: does the body above stand where it should?"
         )
-        yield gathered(text, [*pulled])
+        yield one_remark(text, [*pulled])
 
 
 def _from_below(element: FlatElement, kinds: Mapping[str, str]) -> bool:

@@ -41,7 +41,7 @@ def with_preloads(model: Model) -> Model:
     """
     key = _key(model)
     if key not in _KEPT:
-        system = _solved(model).system
+        system = _solve_preloads(model).system
         if len(_KEPT) >= MOST_KEPT:
             _KEPT.clear()
         _KEPT[key] = system.links.spring[:, 2].copy(), system.mounts.preload.copy()
@@ -68,14 +68,14 @@ def _key(model: Model) -> bytes:
     return digest.digest()
 
 
-def _solved(model: Model) -> Model:
+def _solve_preloads(model: Model) -> Model:
     """Solve every `auto` preload, see `with_preloads`."""
     if model.design is not None:
         design = with_preloads(model.design).system
         preloads = design.links.spring[:, 2], design.mounts.preload
-        return _levelled(with_these_preloads(model, *preloads))
+        return _levelled_model(with_these_preloads(model, *preloads))
     free_lengths = any(e.definition.has_free_length for e in model.flat.elements)
-    filled, unbalanced = _balanced(model, _auto_preloads(model), given=free_lengths)
+    filled, unbalanced = _balance(model, _auto_preloads(model), given=free_lengths)
     if not unbalanced:
         return _with_pressing_wedges(filled)
     raise ModelError(
@@ -84,7 +84,7 @@ def _solved(model: Model) -> Model:
     )
 
 
-def _balanced(
+def _balance(
     model: Model, support: dict[int, float], *, given: bool = False
 ) -> tuple[Model, list[str]]:
     """Return the model with the preloads of `support`, and what they leave unbalanced.
@@ -94,9 +94,9 @@ def _balanced(
     """
     conditions = _conditions(model.system)
     weights = [(int(body), 2) for body in model.system.bodies.fixed]
-    for wanted in [[*conditions, *weights], conditions] if weights else [conditions]:
-        filled, rest = _with_solved_preloads(model, support, wanted)
-        unbalanced = [] if given else _unbalanced(model, wanted, rest)
+    for equations in [[*conditions, *weights], conditions] if weights else [conditions]:
+        filled, rest = _with_solved_preloads(model, support, equations)
+        unbalanced = [] if given else _unbalanced_forces(model, equations, rest)
         if not unbalanced:
             break
     return filled, unbalanced
@@ -128,7 +128,7 @@ def static_shares(model: Model, *, solved: bool = False) -> dict[str, float]:
     support = _auto_preloads(model, known_lengths=True)
     filled = model
     if not solved:
-        filled, unbalanced = _balanced(model, support)
+        filled, unbalanced = _balance(model, support)
         if unbalanced and not len(model.system.bodies.fixed):
             raise ModelError(
                 "the springs cannot carry the vehicle in its nominal position; unbalanced: "
@@ -155,7 +155,7 @@ def _is_below(model: Model, element: FlatElement) -> bool:
     return one.position[2] >= two.position[2]
 
 
-def _levelled(model: Model) -> Model:
+def _levelled_model(model: Model) -> Model:
     """Fill the air springs of a load case so that what stands on them alone keeps its height.
 
     A levelling valve feeds or drains a bellows until it has its nominal height over the body below.
@@ -326,7 +326,7 @@ def _add(totals: Floats, body: int, lever: Floats, force: Floats) -> None:
     totals[body] += fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
 
-def _unbalanced(model: Model, conditions: list[tuple[int, int]], rest: Floats) -> list[str]:
+def _unbalanced_forces(model: Model, conditions: list[tuple[int, int]], rest: Floats) -> list[str]:
     """What the preloads leave of forces and moments, in words."""
     weight = float(np.sum(model.system.bodies.mass)) * model.system.gravity
     return [

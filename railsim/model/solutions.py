@@ -45,18 +45,18 @@ def solution(
         return solve()
     key = hashlib.sha256(f"{program_hash()} {kind} {inputs}".encode()).hexdigest()[:32]
     path = folder / f"{key}.json"
-    found: dict[str, Any]
+    result: dict[str, Any]
     if (data := stored(path)) is None:
         with alone(path.with_suffix(".lock")) if shared else nullcontext():
             if not shared or (data := stored(path)) is None:  # not by one that was waited for
-                found = solve()
+                result = solve()
                 if shared or _new[kind] < MOST_NEW:
                     _new[kind] += not shared
                     _drop_old(path.parent)
-                    store(path, json.dumps(found).encode())
-                return found
-    found = json.loads(data)
-    return found
+                    store(path, json.dumps(result).encode())
+                return result
+    result = json.loads(data)
+    return result
 
 
 @cache

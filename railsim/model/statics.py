@@ -22,7 +22,7 @@ from railsim.laws import permitted_part
 from railsim.model.assembly import Model, assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.preloads import nominal_forces
-from railsim.model.time_step import empty_recorder, observed
+from railsim.model.time_step import empty_recorder, record_state
 from railsim.profiles import Profile
 from railsim.table import Column, Table
 
@@ -210,7 +210,7 @@ def _springs_and_stops(model: Model, state: Floats) -> tuple[Table, Table]:
     members += [(MOUNT, k, name) for k, name in enumerate(index.mounts)]
     chosen = np.array([member[:2] for member in members], dtype=np.int64).reshape(-1, 2)
     recorder = empty_recorder(model, 1, chosen)
-    observed(model.system, state, recorder)
+    record_state(model.system, state, recorder)
     springs, stops = [], []
     for (group, _, name), row in zip(members, recorder.element[0], strict=True):
         element = elements.get(name) or elements[name.rpartition(".")[0]]
@@ -219,7 +219,7 @@ def _springs_and_stops(model: Model, state: Floats) -> tuple[Table, Table]:
         if gaps is not None:
             stops.append([name, *gaps])
         carries = element.definition.vertical_stiffness > 0.0
-        shorter, pressed = _pressed(element, travel, force, is_link=group == LINK)
+        shorter, pressed = _shortening(element, travel, force, is_link=group == LINK)
         if carries or (abs(pressed) > NO_FORCE and gaps is not None):
             apart = dist(element.point1, element.point2)
             springs.append([name, pressed, apart - shorter if apart > 0.0 else nan, shorter])
@@ -229,7 +229,7 @@ def _springs_and_stops(model: Model, state: Floats) -> tuple[Table, Table]:
     )
 
 
-def _pressed(
+def _shortening(
     element: FlatElement, travel: Floats, force: Floats, *, is_link: bool
 ) -> tuple[float, float]:
     """By how much an element is shorter than in the nominal position [m], its compression [N]."""

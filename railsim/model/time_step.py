@@ -141,7 +141,7 @@ def empty_recorder(
     )
 
 
-def observed(system: System, state: Floats, recorder: Recorder) -> int:
+def record_state(system: System, state: Floats, recorder: Recorder) -> int:
     """Record a state in one row without a step; return the status."""
     work, rest = work_arrays(system), np.zeros((3, len(state)))
     once = FAST, 1.0, Chunk(0, 0, 1, closing=1)
@@ -337,7 +337,7 @@ def _step_growth(
     rest = np.zeros_like(state), np.zeros((3, len(state))), empty_recorder(model, 1)
     one = SCHEMES[scheme], h, Chunk(1, 1, _NEVER)
 
-    def stepped(trials: Floats) -> Floats:
+    def after_step(trials: Floats) -> Floats:
         after = trials.copy()
         loop = time_loop
         for k, row in enumerate(after):
@@ -349,12 +349,12 @@ def _step_growth(
         return after
 
     if system.contact.transient:  # of which steady rolling knows nothing before its first step
-        state = stepped(state[None])[0]
+        state = after_step(state[None])[0]
         if not np.isfinite(state).all():
             return np.inf
     # without masses the reference scheme balances the track's forces to 0.01 N only
     iterates = scheme == "rk4" and system.support.elastic and system.support.massless
-    columns = _jacobian(stepped, system, state, 1e-6 if iterates else 1e-8)
+    columns = _jacobian(after_step, system, state, 1e-6 if iterates else 1e-8)
     if not np.isfinite(columns).all():
         return np.inf
     if enough > 0.0 and (bound := _bound(columns, enough * h)):

@@ -136,7 +136,7 @@ class Run:
         """Time to its end at the present speed [s]."""
         return self.prepared.left(self.state)
 
-    def compiled(self, function: Any, *args: object) -> Any:
+    def invoke(self, function: Any, *args: object) -> Any:
         """Call a compiled function of system and work arrays, without a search for types."""
         call = self._entries.get(function, function)
         result = call(self.system, self.work, *args)
@@ -144,12 +144,12 @@ class Run:
             self._entries[function] = entry(function, self.system, self.work, *args)
         return result
 
-    def choice(self) -> tuple[float, int] | None:
+    def next_step(self) -> tuple[float, int] | None:
         """Step and number of steps to the next output; none at the end, or where there is none."""
         if self.left() <= ROUND_OFF:
             return None
         if self.spacing is not None:
-            self.compiled(right_hand_sides, self.state[None], self.derivative[None])
+            self.invoke(right_hand_sides, self.state[None], self.derivative[None])
         speed = self.state[SPEED]
         try:
             return self.prepared.steps.at(speed, self.derivative[SPEED])
@@ -186,7 +186,7 @@ class Run:
             self._prepared = prepared
             divide_strikes(self.system, self.work, self.scheme, *prepared)
         arrays = self.state, self.derivative, self.stages, self.recorder
-        status, where, steps, rows = self.compiled(time_loop, *arrays, self.scheme, step, chunk)
+        status, where, steps, rows = self.invoke(time_loop, *arrays, self.scheme, step, chunk)
         self.fresh = self.fresh and steps == 0
         self.cpu_time += time.thread_time() - begin
         return status, where, steps, rows
@@ -203,21 +203,21 @@ class Run:
         except Exception as error:
             self.error = error
 
-    def kept(self) -> list[NDArray[Any]]:
+    def arrays(self) -> list[NDArray[Any]]:
         """All arrays that the run goes on from: its state first."""
         return [self.state, *(getattr(self.work, name) for name in COUNTED), self.extremes]
 
-    def saved(self) -> SavedState:
+    def save(self) -> SavedState:
         """All that the run goes on from, a copy."""
-        motion, *counted = (one.copy() for one in self.kept())
+        motion, *counted = (one.copy() for one in self.arrays())
         grid = self.fresh, self.evaluates, float(self.derivative[SPEED])
         return SavedState(motion, tuple(counted), grid)
 
-    def restore(self, saved: SavedState) -> None:
+    def restore(self, state: SavedState) -> None:
         """Go back to a state."""
-        for here, values in zip(self.kept(), (saved.motion, *saved.counted), strict=True):
+        for here, values in zip(self.arrays(), (state.motion, *state.counted), strict=True):
             here[...] = values
-        self.fresh, self.evaluates, self.derivative[SPEED] = saved.grid[-3:]
+        self.fresh, self.evaluates, self.derivative[SPEED] = state.grid[-3:]
         self._prepared = None
 
     def take_last_extremes(self) -> None:

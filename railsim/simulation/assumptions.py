@@ -8,7 +8,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.model.control import periods
-from railsim.simulation.sampling import output_words, sampled
+from railsim.simulation.sampling import output_words, with_loop_rate
 
 
 def assumptions(vehicle: Vehicle, track: Track, settings: Settings, speed: float) -> list[str]:
@@ -19,7 +19,7 @@ def assumptions(vehicle: Vehicle, track: Track, settings: Settings, speed: float
     wheelsets = (body.wheelset for body in flatten(vehicle).bodies)
     wheels = _listed(name for wheelset in wheelsets if wheelset for name in wheelset.profile)
     inclination = f"1:{1.0 / track.inclination:.4g}" if track.inclination else "upright"
-    most = [(sampled(settings).output_interval(speed), "output")]  # which no step exceeds
+    most = [(with_loop_rate(settings).output_interval(speed), "output")]  # which no step exceeds
     most += [(period, "controllers and sampled signals") for period in periods(vehicle)]
     chosen = f"chosen, {1e3 * min(most)[0]:.4g} ms at most ({min(most)[1]})"
     step = chosen if settings.step is None else f"{settings.step * 1e3:.4g} ms"

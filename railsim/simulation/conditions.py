@@ -19,7 +19,7 @@ from railsim.errors import Fault, Faults, argument_error, argument_fault, neares
 from railsim.model.assembly import check_fixed
 from railsim.notation import QUANTITIES
 from railsim.result import Result
-from railsim.simulation.sampling import sampled
+from railsim.simulation.sampling import with_loop_rate
 from railsim.simulation.step_choice import WRITTEN
 from railsim.text import shortened
 from railsim.units import speed_in_si
@@ -116,7 +116,7 @@ def check_range(
 
 
 def check_agreement(
-    vehicle: Vehicle, track: Track, settings: Settings, speed: float, called: str = ""
+    vehicle: Vehicle, track: Track, settings: Settings, speed: float, vehicle_name: str = ""
 ) -> None:
     """Check what can be known of a vehicle, its track and its settings before a model is made.
 
@@ -125,7 +125,7 @@ def check_agreement(
     that cannot be fixed on this track.
     """
     faults, outputs = Faults(), settings.outputs
-    there = f" in vehicle '{called or vehicle.name}'"
+    there = f" in vehicle '{vehicle_name or vehicle.name}'"
     fixed = any(body.fixed for group in groups(vehicle) for body in group.bodies.values())
     needed = fixed or settings.initial or outputs.elements
     # of a copy: a study would keep all its vehicles in this form
@@ -151,7 +151,7 @@ def check_agreement(
                 key = "outputs.elements" if where else "outputs.quantities"
                 found = f"no {word} is called '{pattern}'{where}"
                 faults.append(Fault("settings", key, found, nearest(pattern, names)))
-    interval = sampled(settings).output_interval(speed)
+    interval = with_loop_rate(settings).output_interval(speed)
     if settings.step is not None and settings.drive.mode == "constant":
         count = max(1, round(interval / settings.step))
         if abs(count * settings.step - interval) > WRITTEN * interval:

@@ -70,7 +70,7 @@ def _wheel_loads(model: Model, work: Work, state: Floats) -> Floats | None:
 
 
 def _follow_contacts(
-    model: Model, loads_of: Loads, w: int, change: InitialState, wanted: Floats, state: Floats
+    model: Model, loads_of: Loads, w: int, change: InitialState, target: Floats, state: Floats
 ) -> None:
     """Lift and roll wheelset `w` until its wheels carry `wanted`; as it is where that fails.
 
@@ -84,20 +84,20 @@ def _follow_contacts(
         trial[[first + 1, first + 5]] = state[[first + 1, first + 5]]
         trial[first + 1] -= left * change.y
         trial[first + 5] -= left * change.yaw
-        if not _carries(loads_of, w, first, wanted, trial):
+        if not _make_carry(loads_of, w, first, target, trial):
             return
     state[[first + 2, first + 3]] = trial[[first + 2, first + 3]]
 
 
-def _carries(loads_of: Loads, w: int, first: int, wanted: Floats, trial: Floats) -> bool:
+def _make_carry(loads_of: Loads, w: int, first: int, target: Floats, trial: Floats) -> bool:
     """Find the height and roll at which wheelset `w` carries `wanted`, by Newton's method."""
     moved = [first + 2, first + 3]
     for _ in range(_STEPS):
         loads = loads_of(trial)
         if loads is None:
             return False
-        rest = loads[w] - wanted
-        if np.max(np.abs(rest)) < CLOSE * np.max(wanted):
+        rest = loads[w] - target
+        if np.max(np.abs(rest)) < CLOSE * np.max(target):
             return True
         slope = np.empty((2, 2))
         for k, at in enumerate(moved):

@@ -34,7 +34,7 @@ from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.assembly import Model
 from railsim.model.check_rails import standing_at
 from railsim.model.equilibrium import tracks_under
-from railsim.model.time_step import Situation, empty_recorder, observed
+from railsim.model.time_step import Situation, empty_recorder, record_state
 from railsim.model.work import CONSTANT_SPEED, uneven_rigid_rails, without_loads
 from railsim.notation import ROLL, YAW, Y, Z
 from railsim.profiles.profile import Profile
@@ -97,8 +97,8 @@ def in_flange_contact(
         for curve in of_hand:
             if abs(curve[0]) >= below:
                 continue
-            brought = partial(_brought, model, track, curve, progress)
-            at = _settled(model, rolling, step, brought)
+            run_into_curve = partial(_run_into_curve, model, track, curve, progress)
+            at = _settle_in_curve(model, rolling, step, run_into_curve)
             if at is not None:
                 found.append(at)
                 if _all_loaded(model, *at):
@@ -140,7 +140,7 @@ def _is_hollow(wheel: Profile) -> bool:
     return bool(np.max(tread - np.minimum.accumulate(tread)) > HOLLOW)
 
 
-def pushed(model: Model, system: System, rolling: Floats, step: float) -> list[Situation]:
+def under_forces(model: Model, system: System, rolling: Floats, step: float) -> list[Situation]:
     """State of rest under the given forces and torques, each at its largest, if they push aside.
 
     `system`, `rolling`: of steady rolling on straight track, without any; `step`: stable there.
@@ -158,7 +158,7 @@ def pushed(model: Model, system: System, rolling: Floats, step: float) -> list[S
         given = loads._replace(start=start, table=np.reshape(table, (-1, 4)), flags=over_time)
         return system._replace(loads=given)
 
-    if not _advanced(model, rising(state[TIME]), state, 0.25 * step, sum(TIMES)):
+    if not _advance(model, rising(state[TIME]), state, 0.25 * step, sum(TIMES)):
         return []
     constant = rising(rolling[TIME] - TIMES[0])
     with suppress(NotConverged):  # then where the vehicle is at the end of the time
@@ -183,12 +183,12 @@ def _symmetric(model: Model, track: Track, rolling: Floats) -> bool:
 def _all_loaded(model: Model, system: System, state: Floats) -> bool:
     """Whether every wheel carries load."""
     recorder = empty_recorder(model, 1)
-    observed(system, state, recorder)
+    record_state(system, state, recorder)
     return bool(np.all(recorder.wheel[0, :, :, W_Q] > 0.0))
 
 
-def _settled(
-    model: Model, rolling: Floats, step: float, brought: Callable[..., Situation | None]
+def _settle_in_curve(
+    model: Model, rolling: Floats, step: float, run_into_curve: Callable[..., Situation | None]
 ) -> Situation | None:
     """System on a curve and the settled vehicle; None where it does not stay on the track.
 
@@ -197,21 +197,23 @@ def _settled(
     if not (model.system.internal.kind == PAD).any():
         start = rolling.copy()
         start[SPEED] = max(start[SPEED], BEGIN)
-        found = brought(start, step, SHORT, SHORT_LENGTHS)
+        found = run_into_curve(start, step, SHORT, SHORT_LENGTHS)
         with suppress(NotConverged):
             if found is not None:
                 return found[0], _at_rest(model, *found, rolling)
-    return brought(rolling, 0.5 * step, TIMES)
+    return run_into_curve(rolling, 0.5 * step, TIMES)
 
 
-def at_rest_beside(model: Model, at: Situation, speed: float, less: float | Floats) -> Situation:
+def at_rest_with(
+    model: Model, situation: Situation, speed: float, less: float | Floats
+) -> Situation:
     """System and state of rest at another speed and with less friction, by Newton's method.
 
     `at`: system and vehicle at rest on a curve; `speed`: [m/s]; `less`: taken from the coefficients
     of friction, of both rails or float64[2].  Raises NotConverged: there is no state of rest near
     the known one.
     """
-    system, state = at
+    system, state = situation
     rail = system.track.rail.copy()
     friction = rail[:, MU_LEFT : MU_RIGHT + 1, 0]
     np.maximum(friction - less, 0.0, out=friction)
@@ -219,10 +221,10 @@ def at_rest_beside(model: Model, at: Situation, speed: float, less: float | Floa
     return system, SteadyRolling(model, system).solve(state, speed)
 
 
-def guided(model: Model, track: Track, at: Situation) -> list[Situation]:
+def at_check_rails(model: Model, track: Track, situation: Situation) -> list[Situation]:
     """Return a situation with the check rails where each of the track's is nearest to its rail."""
     found = []
-    system, state = at
+    system, state = situation
     for rail in track.check_rail:
         s, _ = min(rail.flangeway, key=lambda row: row[1])
         check = standing_at(model.check, s)
@@ -231,25 +233,25 @@ def guided(model: Model, track: Track, at: Situation) -> list[Situation]:
     return found
 
 
-def narrowed(model: Model, track: Track, at: Situation) -> list[Situation]:
+def at_narrowest_gauge(model: Model, track: Track, situation: Situation) -> list[Situation]:
     """Return a situation led to the track's narrowest gauge, if that is narrower than usual."""
-    system, state = at
+    system, state = situation
     _, left, right = min(track.gauge_widening or ((0.0, 0.0, 0.0),), key=lambda row: sum(row[1:]))
     if left + right >= 0.0:
         return []
 
-    def moved(share: float) -> tuple[System, float]:
+    def with_gauge(share: float) -> tuple[System, float]:
         rail = system.track.rail.copy()
         rail[:, Y_LEFT, 0], rail[:, Y_RIGHT, 0] = -share * left, share * right
         table = system.track._replace(rail=rail, has_irregularity=1)
         return system._replace(track=table), float(state[SPEED])
 
     with suppress(NotConverged):  # then the usual gauge decides alone
-        return [(moved(1.0)[0], led(model, moved, state)[0])]
+        return [(with_gauge(1.0)[0], led(model, with_gauge, state)[0])]
     return []
 
 
-def _brought(
+def _run_into_curve(
     model: Model,
     track: Track,
     curve: tuple[float, float],
@@ -272,10 +274,10 @@ def _brought(
     smooth = without_loads(system)._replace(track=tables, drive=CONSTANT_SPEED)
     state = rolling.copy()
     time = auxiliary.length / speed
-    return (smooth, state) if _advanced(model, smooth, state, step, time, progress) else None
+    return (smooth, state) if _advance(model, smooth, state, step, time, progress) else None
 
 
-def _advanced(
+def _advance(
     model: Model,
     system: System,
     state: Floats,

@@ -147,13 +147,13 @@ class Chunk(Mapping[str, Floats]):
 READINGS = ("sensor_acceleration", "sensor_roll_rate")
 
 
-def requested(outputs: Outputs, track: Track) -> list[Quantity]:
+def extra_quantities(outputs: Outputs, track: Track) -> list[Quantity]:
     """Quantities beyond the usual ones of a run; `element_command` is there of actuators alone."""
-    asked = {**dict(outputs), "check_rail": track.check_rail}
-    found = [q for q in REQUESTED.values() if asked[q.request]]
+    requests = {**dict(outputs), "check_rail": track.check_rail}
+    quantities = [q for q in REQUESTED.values() if requests[q.request]]
     if outputs.sensors == "readings":
-        found = [q for q in found if q.request != "sensors" or q.name in READINGS]
-    return found
+        quantities = [q for q in quantities if q.request != "sensors" or q.name in READINGS]
+    return quantities
 
 
 class OutputPlan:
@@ -165,7 +165,7 @@ class OutputPlan:
     def __init__(self, model: Model, settings: Settings, track: Track, vehicle: Vehicle) -> None:
         self._model = model
         self._sensors = all_sensors(vehicle) if settings.outputs.sensors else {}
-        self._asked = settings.outputs
+        self._outputs = settings.outputs
         self._readings_only = settings.outputs.sensors == "readings"
         self._alignment = alignment_of(track)
         self._track_file = track
@@ -179,25 +179,25 @@ class OutputPlan:
             )
             for index, name in enumerate(names)
         }
-        self.elements = tuple(name for name in known if matches(name, self._asked.elements))
+        self.elements = tuple(name for name in known if matches(name, self._outputs.elements))
         # torques of actuators about axles are recorded beyond the elements that are asked for
         on_axles = np.flatnonzero(model.system.actuators.which[:, ACTION] == AXLE)
-        self._on_axles = on_axles if self._asked.drives else on_axles[:0]
+        self._on_axles = on_axles if self._outputs.drives else on_axles[:0]
         chosen = [known[name] for name in self.elements]
         self._chosen = np.array([*chosen, *((ACTUATOR, i) for i in self._on_axles)], dtype=np.int64)
-        self._own = OwnOutputs(settings, self._known(), self.coordinates)
-        self.quantities = (*self._kept(), *self._own.quantities)
+        self._own = OwnOutputs(settings, self._all_quantities(), self.coordinates)
+        self.quantities = (*self._stored_quantities(), *self._own.quantities)
 
-    def _kept(self) -> tuple[Quantity, ...]:
+    def _stored_quantities(self) -> tuple[Quantity, ...]:
         """All quantities of the result: of the usual ones those that are asked for."""
-        every, patterns = self._known(), self._asked.quantities
+        every, patterns = self._all_quantities(), self._outputs.quantities
         if not patterns:
             return every
         asked = (*NEEDED, *patterns)
         return tuple(q for q in every if matches(q.name, asked) or q.name not in QUANTITIES)
 
-    def _known(self) -> tuple[Quantity, ...]:
-        more = requested(self._asked, self._track_file)
+    def _all_quantities(self) -> tuple[Quantity, ...]:
+        more = extra_quantities(self._outputs, self._track_file)
         if not set(self.elements) & set(self._model.index.actuators):
             more = [q for q in more if q.name != "element_command"]
         return (*QUANTITIES.values(), *more)
@@ -211,7 +211,7 @@ class OutputPlan:
         }
         if self.elements:
             names["element"] = self.elements
-        if self._asked.contact_patches:
+        if self._outputs.contact_patches:
             count = parts_of_wheel(self._model.rails.arrays)
             names["patch"] = PATCHES + tuple(
                 f"{name}, rail {k + 1}" for k in range(1, count) for name in PATCHES
@@ -223,7 +223,7 @@ class OutputPlan:
     def recorder(self, rows: int) -> Recorder:
         """Recorder with room for `rows` outputs."""
         chosen = self._chosen.reshape(-1, 2)
-        return empty_recorder(self._model, rows, chosen, self._asked.contact_patches)
+        return empty_recorder(self._model, rows, chosen, self._outputs.contact_patches)
 
     def _axle_torques(self, recorder: Recorder, rows: int) -> Floats:
         """Torques of drives, brakes and actuators on each wheelset, forwards positive [N m]."""
@@ -250,11 +250,11 @@ class OutputPlan:
             values |= zip(READINGS, readings(self._sensors, *of_bodies, *track), strict=True)
             if not self._readings_only:
                 values |= motions(self._sensors, *of_bodies, *track)
-        if self._asked.contact_patches:
+        if self._outputs.contact_patches:
             values |= _patches(recorder.patch[:rows], recorder.state[:rows, -1])
-        if self._asked.drives:
+        if self._outputs.drives:
             values["axle_torque"] = self._axle_torques(recorder, rows)
-        if self._asked.track:
+        if self._outputs.track:
             values |= self._track(values["wheelset_distance"])
             deflection = recorder.rail[:rows]
             axles = self._model.system.contact.body

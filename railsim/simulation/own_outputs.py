@@ -26,10 +26,10 @@ class OwnOutputs:
     def __init__(
         self,
         settings: Settings,
-        known: Sequence[Quantity],
+        quantities: Sequence[Quantity],
         coordinates: Mapping[str, Sequence[str]],
     ) -> None:
-        self._known = {quantity.name: quantity for quantity in known}
+        self._known = {quantity.name: quantity for quantity in quantities}
         self._coordinates = {"side": SIDES, "component": COMPONENTS, **coordinates}
         self._laws, self.quantities = [], []
         laws = settings.laws or {}
@@ -53,25 +53,25 @@ class OwnOutputs:
         name, *labels = selection.split(":")
         if name not in self._known:
             if name in REQUESTED:
-                asked = f"outputs.{REQUESTED[name].request}"
-                raise _fault(key, f"'{name}' is not output", f"ask for it by {asked}")
+                request = f"outputs.{REQUESTED[name].request}"
+                raise _fault(key, f"'{name}' is not output", f"ask for it by {request}")
             raise _fault(key, f"no quantity '{name}'", nearest(name, self._known))
         dims = self._known[name].dims
         if dims[0] != "time":
             raise _fault(key, f"'{name}' does not change", "a quantity over time")
         try:
-            chosen = chosen_names(dims[1:], self._coordinates, labels)
+            names = chosen_names(dims[1:], self._coordinates, labels)
         except KeyError as error:
             found, _, allowed = str(error.args[0]).partition("; ")
             raise _fault(key, found, allowed) from None
-        if [len(chosen.get(k, ())) for k in range(len(dims) - 1)] != [1] * (len(dims) - 1):
+        if [len(names.get(k, ())) for k in range(len(dims) - 1)] != [1] * (len(dims) - 1):
             raise _fault(key, f"found '{selection}'", f"one label of each: {', '.join(dims[1:])}")
         return name, (
             slice(None),
-            *(list(self._coordinates[dim]).index(chosen[k][0]) for k, dim in enumerate(dims[1:])),
+            *(list(self._coordinates[dim]).index(names[k][0]) for k, dim in enumerate(dims[1:])),
         )
 
-    def values(self, known: Mapping[str, Floats]) -> tuple[dict[str, Floats], str]:
+    def values(self, outputs: Mapping[str, Floats]) -> tuple[dict[str, Floats], str]:
         """Return what the laws give of the other quantities, float64[time], and what is wrong.
 
         That is, which law gave a value that is not finite although all that it was given is; or
@@ -79,13 +79,13 @@ class OwnOutputs:
         """
         found, wrong = {}, ""
         for name, bound, places, parameters in self._laws:
-            given = [known[quantity][at] for quantity, at in places]
-            rows = np.stack(given, axis=-1) if given else np.empty((len(known["time"]), 0))
+            given = [outputs[quantity][at] for quantity, at in places]
+            rows = np.stack(given, axis=-1) if given else np.empty((len(outputs["time"]), 0))
             found[name] = bound.values(rows, parameters)
             bad = np.flatnonzero(~np.isfinite(found[name]) & np.isfinite(rows).all(axis=-1))
             if bad.size and not wrong:
                 words = f"the law of output {name} gave a value that is not finite"
-                wrong = f"{words} at {known['time'][bad[0]]:.6g} s"
+                wrong = f"{words} at {outputs['time'][bad[0]]:.6g} s"
         return found, wrong
 
 

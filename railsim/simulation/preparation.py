@@ -35,7 +35,7 @@ from railsim.simulation.first_start import compiled_beside
 from railsim.simulation.outputs import OutputPlan, run_extremes
 from railsim.simulation.run_in import start_state
 from railsim.simulation.run_progress import RunProgress
-from railsim.simulation.sampling import filtering, low_pass_remark, output_words, sampled
+from railsim.simulation.sampling import filtering, low_pass_remark, output_words, with_loop_rate
 from railsim.simulation.step_choice import StepChoice, inputs_hash
 from railsim.track.irregularity import measured_remarks
 
@@ -59,7 +59,7 @@ def prepare(
     on_run_in: SettlingProgress | None = None,
 ) -> Preparation:
     """Assemble, balance, choose the step and set the initial state: `before`, where it is given."""
-    balance, steps = _balanced(vehicle, track, settings, speed, profiles, on_judgement)
+    balance, steps = _equilibrium_and_steps(vehicle, track, settings, speed, profiles, on_judgement)
     model = balance.model
     step, _ = steps.at(speed)
     unusual = [*settings.unusual(), *vehicle_remarks(vehicle, model)]
@@ -81,12 +81,12 @@ def prepare(
         remarks += begins_on_sections(model, start - step * speed * on_the_way)
         remarks += disturb(model, balance.Q0, settings, state)
     else:
-        state = _taken_up(before.motion, model.n_state)
+        state = _check_length(before.motion, model.n_state)
     model = with_control(model, vehicle, settings)
     memory = model.system.own.memory.copy()
     memory[START] = state[TIME]
     if before is not None and before.memory is not None:
-        memory = _taken_up(before.memory, len(memory))
+        memory = _check_length(before.memory, len(memory))
     prepared = Preparation(
         model,
         balance,
@@ -98,7 +98,7 @@ def prepare(
         memory=memory,
         remarks=tuple(remarks),
     )
-    return replace(prepared, evaluation=_evaluation(prepared, settings))
+    return replace(prepared, evaluation=_begin_of_evaluation(prepared, settings))
 
 
 def begins_on_sections(model: Model, start: float) -> Iterator[str]:
@@ -115,7 +115,7 @@ def begins_on_sections(model: Model, start: float) -> Iterator[str]:
         )
 
 
-def _balanced(
+def _equilibrium_and_steps(
     vehicle: Vehicle,
     track: Track,
     settings: Settings,
@@ -130,13 +130,13 @@ def _balanced(
     balance = stored_equilibrium(model, speed, inputs)
     known = {speed: balance.state}
     straight = inputs_hash(vehicle, track, settings, model, straight=True)
-    how = sampled(settings), track, known, inputs, straight, on_judgement, periods(vehicle)
+    how = with_loop_rate(settings), track, known, inputs, straight, on_judgement, periods(vehicle)
     return balance, StepChoice(balance.model, *how)
 
 
 def check_step(vehicle: Vehicle, track: Track, settings: Settings, speed: float) -> None:
     """Raise InputError: the step of the settings is not stable; or ModelError, as `simulate`."""
-    _balanced(vehicle, track, settings, speed)[1].at(speed)
+    _equilibrium_and_steps(vehicle, track, settings, speed)[1].at(speed)
 
 
 def check_own_outputs(vehicle: Vehicle, track: Track, settings: Settings) -> None:
@@ -144,18 +144,18 @@ def check_own_outputs(vehicle: Vehicle, track: Track, settings: Settings) -> Non
     OutputPlan(assemble(vehicle, track, settings), settings, track, vehicle)
 
 
-def _evaluation(prepared: Preparation, settings: Settings) -> float:
+def _begin_of_evaluation(preparation: Preparation, settings: Settings) -> float:
     """Time from which on peaks are evaluated: without the start, but not where a run goes on."""
-    begin = float(prepared.state[TIME])
-    if not prepared.fresh:
+    begin = float(preparation.state[TIME])
+    if not preparation.fresh:
         return begin
-    asked = settings.outputs.evaluate_after
-    if asked is None:
-        return begin + min(LEFT_OUT, SHARE_LEFT_OUT * prepared.left(prepared.state))
-    return begin + asked
+    after = settings.outputs.evaluate_after
+    if after is None:
+        return begin + min(LEFT_OUT, SHARE_LEFT_OUT * preparation.left(preparation.state))
+    return begin + after
 
 
-def _taken_up(before: Floats, length: int) -> Floats:
+def _check_length(before: Floats, length: int) -> Floats:
     """Return values with which a run goes on, of which there have to be so many."""
     if len(before) != length:
         found, allowed = f"a state of {before.size} values", f"{length}, those of this vehicle"

@@ -94,7 +94,7 @@ def run_remarks(run: Run, swings: Hunting | None, seen: Result) -> tuple[str, ..
                 irregular=irregular,
                 varying=len(support.variation) > 1,
                 struck=bool(model.check.check.size),
-                centred=_centred(extremes),
+                centred=_is_centred(extremes),
                 slides=bool(model.system.track.rail[:, 4:, 0].any()),  # of both rails, in its cells
                 elastic=bool(support.elastic),
             ),
@@ -180,7 +180,7 @@ def lifted_wheels(
     )
 
 
-def _centred(extremes: Mapping[str, Floats]) -> bool:
+def _is_centred(extremes: Mapping[str, Floats]) -> bool:
     """Whether no wheelset has left the middle of the track."""
     return bool(np.max(np.abs(extremes["wheelset_lateral"])) < UNDISTURBED)
 
@@ -189,7 +189,7 @@ def stability(swings: Hunting | None, extremes: Mapping[str, Floats], duration: 
     """Remark on a vehicle that hunts, or that nothing has disturbed laterally in the run [s]."""
     if swings is not None:
         return swings.sentence
-    if duration < LONG or not _centred(extremes):
+    if duration < LONG or not _is_centred(extremes):
         return ""
     return (
         "Nothing disturbs the vehicle laterally: its wheelsets stay in the middle of the track, "
@@ -259,21 +259,21 @@ def yaw_range(look_ups: int, of_sections: float) -> str:
     )
 
 
-def alternation(measured: Floats, Q0: Floats, wheelsets: Sequence[str], divided: int) -> str:
+def alternation(vibrations: Floats, Q0: Floats, wheelsets: Sequence[str], divided: int) -> str:
     """Remark on a guiding force that alternates from step to step.
 
     Arguments as of `vibration`; `divided`: number of divided steps.
     """
-    if not len(measured):
+    if not len(vibrations):
         return ""
-    amplitude = 0.25 * np.sqrt(measured[..., ALTERNATION])
+    amplitude = 0.25 * np.sqrt(vibrations[..., ALTERNATION])
     w, side = first_largest(amplitude / Q0)
     if not amplitude[w, side] > ALTERNATES[divided > 0] * Q0[w, side]:
         return ""
     return (
         f"The guiding force of the {SIDES[side]} wheel of {wheelsets[w]} alternates from step to "
         f"step by {1e-3 * amplitude[w, side]:.1f} kN, vehicle at s = "
-        f"{measured[w, side, ALTERNATES_AT]:.0f} m: the step is too long there, and the vehicle "
+        f"{vibrations[w, side, ALTERNATES_AT]:.0f} m: the step is too long there, and the vehicle "
         f"may be held in a state that is none of its own; compare with half the step "
         f"(--check-step)."
     )
@@ -330,19 +330,19 @@ def long_for_slip_control(step: float, below: float, slowest: float) -> str:
     )
 
 
-def vibration(measured: Floats, Q0: Floats, wheelsets: Sequence[str], cause: str) -> str:
+def vibration(vibrations: Floats, Q0: Floats, wheelsets: Sequence[str], cause: str) -> str:
     """Remark on wheel loads that vibrate, as a high pass at 40 Hz shows them.
 
     `measured`: see `railsim.kernels.vibration`; `Q0`: static wheel loads [N]; `cause`: see
     `vibration_cause`.
     """
-    if not len(measured):
+    if not len(vibrations):
         return ""
-    share = measured[..., AMPLITUDE] / Q0
+    share = vibrations[..., AMPLITUDE] / Q0
     w, side = first_largest(share)
     if not share[w, side] > VIBRATES:
         return ""
-    frequency, position = measured[w, side, FREQUENCY], measured[w, side, POSITION]
+    frequency, position = vibrations[w, side, FREQUENCY], vibrations[w, side, POSITION]
     return (
         f"The wheel loads vibrate at {frequency:.0f} Hz: {100.0 * share[w, side]:.0f} % of Q0 "
         f"(high pass {CUT_OFF:g} Hz) on the {SIDES[side]} wheel of {wheelsets[w]}, "

@@ -95,7 +95,7 @@ def start_state(
     """
     speed = float(balance.state[SPEED])
 
-    def arrived(steps: int) -> Floats:
+    def state_after(steps: int) -> Floats:
         """State at `start` after so many steps over the real track."""
         s = start - steps * speed * step
         before = 0.0
@@ -113,7 +113,7 @@ def start_state(
         frames = _frames(model, s)
         state = None if remark is None else _steady(model, balance, track, s, remark)
         if state is None:
-            state = settled(model, balance, track, s, step, settling)
+            state = settle_in_curve(model, balance, track, s, step, settling)
         if state is None:
             standing = _standing(model, balance, track, s, at_start=not steps)
             state = initial_state(model, standing, s, frames)
@@ -136,14 +136,14 @@ def start_state(
     steps = approach(model, track, start, speed, step)
     whole = math.floor(start / (speed * step))
     try:
-        return arrived(steps), steps
+        return state_after(steps), steps
     except InputError:
         if whole <= steps:
             raise
-    return arrived(whole), whole
+    return state_after(whole), whole
 
 
-def _guided(system: System, check: CheckRails) -> System:
+def _with_check_rails(system: System, check: CheckRails) -> System:
     """Return the system with check rails."""
     return system._replace(contact=system.contact._replace(**check._asdict()))
 
@@ -163,7 +163,7 @@ def _standing(
     there = _inclined(circle(track, at=s), track, s)
     if drive.mode == TABLE:
         drive = drive._replace(table=drive.table + np.array([POSITION - s, 0.0]))
-    system = _supported(without_loads(model.system), s)._replace(
+    system = _with_support_at(without_loads(model.system), s)._replace(
         track=track_tables(there), drive=drive
     )
     speed = float(balance.state[SPEED])
@@ -176,7 +176,7 @@ def _standing(
     return replace(balance, state=state)
 
 
-def _supported(system: System, s: float) -> System:
+def _with_support_at(system: System, s: float) -> System:
     """Return the system with the support of the rails at `s` moved to `POSITION`."""
     moved = system.support.variation + np.array([POSITION - s, 0.0, 0.0])
     return system._replace(support=system.support._replace(variation=moved))
@@ -198,13 +198,13 @@ def approach(model: Model, track: Track, start: float, speed: float, step: float
     """
     system = model.system
     room = start + float(np.min(system.frame_offset)) - system.track.s_start - SMOOTH
-    along = alignment_of(track), _changing(model.rails.ends, system.support.variation, track)
-    way = max(APPROACH_TIME * speed, APPROACH) if _displaced(model, start) else 0.0
+    along = alignment_of(track), _changing_ranges(model.rails.ends, system.support.variation, track)
+    way = max(APPROACH_TIME * speed, APPROACH) if _is_displaced(model, start) else 0.0
     way += _way_from_constant(*along, start - way, system.frame_offset, room - way, speed)
     return max(0, math.floor(min(way, room) / (speed * step)))
 
 
-def _changing(sections: Floats, support: Floats, track: Track) -> Floats:
+def _changing_ranges(sections: Floats, support: Floats, track: Track) -> Floats:
     """Ranges over which section, support or friction of the rails or check rails change [m].
 
     `sections`: begin and end of the ranges of sections; `support`: rows of `Support.variation`.
@@ -216,11 +216,11 @@ def _changing(sections: Floats, support: Floats, track: Track) -> Floats:
     return np.vstack([sections.reshape(-1, 2), np.array(ranges).reshape(-1, 2)])
 
 
-def _displaced(model: Model, start: float) -> bool:
+def _is_displaced(model: Model, start: float) -> bool:
     """Whether an irregularity moves the rails under the wheelsets."""
     if not model.system.track.has_irregularity:
         return False
-    work = _located(model, start)
+    work = _rails_at(model, start)
     moved = [MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, SINE, ROLL_SLOPE]
     return bool(work.plane[:, moved].any() or work.rail[:, :, ASIDE : ASIDE_SLOPE + 1].any())
 
@@ -235,8 +235,8 @@ def _way_from_constant(
     farthest = min(max(LONGEST_APPROACH_TIME * speed, LONGEST_APPROACH), room)
     ways = np.arange(0.0, max(farthest, 0.0) + 0.5, 0.5)
     under = np.arange(float(np.min(offsets)), float(np.max(offsets)) + 0.5, 0.5)
-    for tried in (ways[:1], ways):  # most runs begin where nothing changes
-        s = start - tried[:, None] + under
+    for distances in (ways[:1], ways):  # most runs begin where nothing changes
+        s = start - distances[:, None] + under
         changes = [
             alignment.curvature_rate(s),
             alignment.cant_angle_rate(s),
@@ -245,11 +245,11 @@ def _way_from_constant(
         constant = np.all(np.abs(changes) < UNCHANGING, axis=(0, 2))
         constant &= ~((ranges[:, 0] < s[:, -1:]) & (s[:, :1] < ranges[:, 1])).any(axis=1)
         if constant.any():
-            return float(tried[int(np.argmax(constant))])
+            return float(distances[int(np.argmax(constant))])
     return float(farthest)
 
 
-def _located(model: Model, s: float) -> Work:
+def _rails_at(model: Model, s: float) -> Work:
     """Work arrays with the rails under a vehicle at `s`."""
     work = work_arrays(model.system)
     locate_rails(model.system, work, s)
@@ -271,7 +271,7 @@ def follow_rails(model: Model, state: Floats) -> None:
     """Put the wheelsets on irregular rails, moving as the rails lead them."""
     speed, n = state[SPEED], model.index.n_bodies
     before = state.copy()
-    plane = _located(model, float(state[ARC_LENGTH])).plane
+    plane = _rails_at(model, float(state[ARC_LENGTH])).plane
     for w, body in enumerate(model.system.contact.body):
         first, rate = 6 * body, velocity_begin(n) + 6 * body
         height = model.system.bodies.nominal[body, 1]
@@ -286,7 +286,7 @@ def follow_rails(model: Model, state: Floats) -> None:
     _turn_arms(model, state, state - before)
 
 
-def _turn_arms(model: Model, state: Floats, moved: Floats) -> None:
+def _turn_arms(model: Model, state: Floats, displacement: Floats) -> None:
     """Turn the arms of axleboxes so that their springs give way least to what `moved` wheelsets.
 
     With the points (x, y) and vertical stiffnesses k of an arm's springs, counted from the middle
@@ -294,13 +294,13 @@ def _turn_arms(model: Model, state: Floats, moved: Floats) -> None:
     """
     bodies, mounts, n = model.system.bodies, model.system.mounts, model.index.n_bodies
     for arm in bodies.axleboxes:
-        own = mounts.body == arm
-        k = np.broadcast_to(mounts.stiffness[:, 2:], own.shape)[own]
-        x, y, _ = mounts.point[own].T
+        on_arm = mounts.body == arm
+        k = np.broadcast_to(mounts.stiffness[:, 2:], on_arm.shape)[on_arm]
+        x, y, _ = mounts.point[on_arm].T
         if not k @ x**2:
             continue
         for first in (0, velocity_begin(n)):
-            z, roll = moved[first + 6 * bodies.parent[arm] + np.array([2, 3])]
+            z, roll = displacement[first + 6 * bodies.parent[arm] + np.array([2, 3])]
             state[first + 6 * arm + 4] += k @ (x * (z + y * roll)) / (k @ x**2)
 
 
@@ -382,8 +382,8 @@ def _steady(
         )
         return None
     speed, friction = float(balance.state[SPEED]), _friction(track, start)
-    there = _supported(without_loads(model.system), start)
-    level = _guided(there, standing_at(model.check, start))
+    there = _with_support_at(without_loads(model.system), start)
+    level = _with_check_rails(there, standing_at(model.check, start))
 
     def along(share: float) -> tuple[System, float]:
         part = circle(track, curvature=share * curvature, cant=share * cant, friction=friction)
@@ -398,7 +398,7 @@ def _steady(
     return state
 
 
-def settled(
+def settle_in_curve(
     model: Model,
     balance: Equilibrium,
     track: Track,
@@ -424,7 +424,7 @@ def settled(
     if len(rows := there.support.variation):
         everywhere = np.array([[start, *(np.interp(start, rows[:, 0], f) for f in rows.T[1:])]])
         there = there._replace(support=there.support._replace(variation=everywhere))
-    system = _guided(there, standing_at(model.check, start))._replace(
+    system = _with_check_rails(there, standing_at(model.check, start))._replace(
         track=track_tables(auxiliary), drive=CONSTANT_SPEED
     )
     state = balance.state.copy()

@@ -18,7 +18,7 @@ def instants_for_each(settings: Settings) -> int:
     return max(2, math.ceil(FINE / settings.output_rate * (1.0 - 1e-9)))
 
 
-def sampled(settings: Settings) -> Settings:
+def with_loop_rate(settings: Settings) -> Settings:
     """Settings with the rate of the loop's own output."""
     every = instants_for_each(settings)
     if every == 1:

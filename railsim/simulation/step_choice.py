@@ -39,12 +39,12 @@ from railsim.model.time_step import Situation, Stability
 from railsim.model.work import level_track_with_friction, uneven_rigid_rails
 from railsim.simulation.auxiliary_track import Progress
 from railsim.simulation.flange import (
-    at_rest_beside,
-    guided,
+    at_check_rails,
+    at_narrowest_gauge,
+    at_rest_with,
     in_flange_contact,
-    narrowed,
     off_centre,
-    pushed,
+    under_forces,
 )
 from railsim.track.irregularity import shortest_wave
 
@@ -92,7 +92,7 @@ class StepChoice:
         self._progress = progress
         self._inputs, self._on_straight = inputs, on_straight
         self._periods = periods
-        self._known: dict[float, float] = {}
+        self._longest: dict[float, float] = {}
         self._classes: dict[str, Stability] = {}
         self._states = states
         lightest = model.system.bodies.mass[model.system.contact.body].min()
@@ -114,8 +114,8 @@ class StepChoice:
         if self._settings.output_spacing is not None:
             interval = duration(self._settings.output_spacing, speed, rate)
         key = class_speed(speed) if self.varies else speed
-        longest = self._known.get(key) or self._choose(key, self._settings.output_interval(key))
-        self._known[key] = longest
+        longest = self._longest.get(key) or self._choose(key, self._settings.output_interval(key))
+        self._longest[key] = longest
         if self._settings.step is None:
             elastic = bool(self._model.system.support.elastic)
             waves = self._model.wheels.longest_step(speed, self._wave, elastic=elastic)
@@ -135,22 +135,22 @@ class StepChoice:
         requested = self._settings.step
         if requested is None:
             inputs = f"{self._digest(self._model)} {speed!r} {interval!r}"
-            step = solution("step", inputs, lambda: {"step": self._stable(speed, interval)})
+            step = solution("step", inputs, lambda: {"step": self._longest_stable(speed, interval)})
             return float(step["step"])
         if not self.varies:  # as written, perhaps with few digits
             requested = interval / max(1, round(interval / requested))
         if self._stability(self._model, speed, self._states.get(speed)).holds(requested):
             return requested
-        stable = self._stable(speed, interval)  # taken where none is given
+        stable = self._longest_stable(speed, interval)  # taken where none is given
         # a step is too long or not: growth at a shorter one comes from differences across a kink
         if requested <= stable:
             return requested
         found = f"found {requested:.12g} s, unstable at {speed:.12g} m/s"
         raise input_error("settings", found, f"at most {stable:g} s", "step")
 
-    def _stable(self, speed: float, interval: float) -> float:
+    def _longest_stable(self, speed: float, interval: float) -> float:
         """Longest stable step at a speed that divides the output interval."""
-        own = self._stability(self._model, speed, self._states.get(speed))
+        stability = self._stability(self._model, speed, self._states.get(speed))
         by_class = not len(self._model.system.loads.body)  # under which friction decides
 
         def holds(step: float) -> bool:
@@ -160,9 +160,9 @@ class StepChoice:
             if by_class and self._fails_in_class(speed, step):
                 return False
             by_class = False  # its ends do not tell, for shorter steps neither
-            return own.holds(step, own.margin)
+            return stability.holds(step, stability.margin)
 
-        return own.choose(interval, holds)
+        return stability.choose(interval, holds)
 
     def _digest(self, model: Model) -> str:
         """Hash of all that a model with some friction was made of."""
@@ -174,7 +174,7 @@ class StepChoice:
     def _in_class(self, speed: float, step: float) -> bool:
         """Whether a step, with the margin, is stable for the class of a speed and the friction."""
         model = with_class_friction(self._model)
-        return self._judged("class", model, class_speed(speed), step, Stability.holds)
+        return self._judge_once("class", model, class_speed(speed), step, Stability.holds)
 
     def _fails_in_class(self, speed: float, step: float) -> bool:
         """Whether a step is unstable on straight track at the highest speed and lowest friction."""
@@ -184,9 +184,9 @@ class StepChoice:
         def fails(stability: Stability, step: float, margin: float) -> bool:
             return not stability.holds_on_straight(step, margin)
 
-        return self._judged("end of class", model, fastest, step, fails)
+        return self._judge_once("end of class", model, fastest, step, fails)
 
-    def _judged(
+    def _judge_once(
         self,
         kind: str,
         model: Model,
@@ -238,18 +238,18 @@ class StepChoice:
             begun = in_flange_contact(model, self._track, rolling, step, self._progress)
             begun += off_centre(model, self._track, level, rolling)
             if self._settings.step is None:  # loads may be short: a step that is asked for is taken
-                begun += pushed(model, level, rolling, step)
+                begun += under_forces(model, level, rolling, step)
             for at in begun:
                 found.append((at, 1.0))
                 where = model, self._track, at
-                for place in (at, *guided(*where), *narrowed(*where)):
+                for place in (at, *at_check_rails(*where), *at_narrowest_gauge(*where)):
                     near = place
                     for other in product(ends, less_friction(self._track)):
                         (end, less), part = other
                         if place is at and end == speed and not part.any():
                             continue
                         with suppress(NotConverged):  # then the others decide alone
-                            beside = at_rest_beside(model, near, end, less + part)
+                            beside = at_rest_with(model, near, end, less + part)
                             found.append((beside, 0.5))
                             near = place[0], beside[1]
             return found

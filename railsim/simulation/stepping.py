@@ -253,7 +253,7 @@ class Simulation:
         """Choose step and number of steps to the next output where the speed changes."""
         run = self._run
         if self._length == 0.0 or run.varies:
-            self._length, self._every = run.choice() or (math.nan, 0)
+            self._length, self._every = run.next_step() or (math.nan, 0)
             self._goal = run.state[ARC_LENGTH] + (run.spacing or 0.0)
 
     def _next(self) -> float:
@@ -367,7 +367,7 @@ class Simulation:
         if not plain(run.system.actuators, memory, number, float(value), self.time):
             found = "more commands than one every 0.25 ms are on their way"
             raise argument_error("actuator", found, "fewer commands", actuator)
-        self._changed("Actuators")
+        self._note_moved("Actuators")
 
     def set_rails(self, displacement: Floats, velocity: Floats) -> None:
         """Displace the rails under the wheels, as another program's bridge or track does.
@@ -393,12 +393,12 @@ class Simulation:
         before = motion.copy()
         motion[..., :2], motion[..., 2:] = given.values()
         if not np.array_equal(motion, before):
-            self._changed("Rails")
+            self._note_moved("Rails")
 
-    def _changed(self, what: str) -> None:
+    def _note_moved(self, part: str) -> None:
         """Take note that the run does not follow from its inputs alone from here on."""
         self._seen = self._begun = None
-        words = f"{what} were moved from outside: the stored inputs alone give another result."
+        words = f"{part} were moved from outside: the stored inputs alone give another result."
         self._run.remarks = list(dict.fromkeys([*self._run.remarks, words]))
 
     def read(self, name: str) -> Any:
@@ -448,7 +448,7 @@ class Simulation:
     @property
     def state(self) -> SavedState:
         """All that the run goes on from, a copy."""
-        run, saved = self._run, self._run.saved()
+        run, saved = self._run, self._run.save()
         grid = (self._phase, self._missing, self._behind, self._length, self._every, self._goal)
         return replace(saved, grid=(*grid, run.status, run.where, *saved.grid), begun=self._begun)
 
@@ -456,7 +456,7 @@ class Simulation:
     def state(self, saved: SavedState) -> None:
         run = self._run
         given, here = (
-            [one.size for one in each] for each in ((saved.motion, *saved.counted), run.kept())
+            [one.size for one in each] for each in ((saved.motion, *saved.counted), run.arrays())
         )
         if given != here:
             found = f"a state of {given} values"

@@ -33,7 +33,7 @@ from railsim.result import Result, open_result
 from railsim.result.extremes import OF_FACTS
 from railsim.result.hdf5 import Storage
 from railsim.result.sinks import matches
-from railsim.simulation.outputs import requested
+from railsim.simulation.outputs import extra_quantities
 from railsim.simulation.preparation import check_own_outputs, check_step
 from railsim.studies import execute
 from railsim.studies.case import Case, of_settings
@@ -306,7 +306,7 @@ class State:
             return True
         outputs = case.settings.outputs
         recorded = {n for n in QUANTITIES if matches(n, outputs.quantities or ("*",))}
-        recorded |= {q.name for q in requested(outputs, case.track)} - {"element_command"}
+        recorded |= {q.name for q in extra_quantities(outputs, case.track)} - {"element_command"}
         wanted = [*kept_quantities(self._spec.keep), *(() if known else OF_FACTS)]
         return any(name not in result for name in recorded if matches(name, wanted))
 

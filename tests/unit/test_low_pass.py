@@ -10,7 +10,7 @@ from railsim.errors import InputError
 from railsim.notation import QUANTITIES
 from railsim.result import MemorySink, low_pass
 from railsim.result.low_pass import LowPassSink
-from railsim.simulation.sampling import instants_for_each, low_pass_remark, sampled
+from railsim.simulation.sampling import instants_for_each, low_pass_remark, with_loop_rate
 
 NAMES = ("time", "distance", "Q", "Y", "Y_over_Q")
 COORDINATES = {"wheelset": ("only",), "body": ()}
@@ -206,5 +206,5 @@ def test_the_loop_puts_out_the_fewest_whole_parts_that_make_1000_a_second(rate):
     assert every >= 2
     assert every * rate >= 1000.0
     assert (every - 1) * rate < 1000.0 or every == 2
-    assert sampled(settings).output_rate == every * rate
-    assert sampled(Settings(output_rate=rate)).output_rate == rate
+    assert with_loop_rate(settings).output_rate == every * rate
+    assert with_loop_rate(Settings(output_rate=rate)).output_rate == rate

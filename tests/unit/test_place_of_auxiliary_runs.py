@@ -11,7 +11,7 @@ from railsim.definitions import Settings
 from railsim.linear.track_response import track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.observation import Assumed, contact
-from railsim.simulation.run_in import _changing, _way_from_constant
+from railsim.simulation.run_in import _changing_ranges, _way_from_constant
 from railsim.studies import wear_loop
 from railsim.track.alignment import Alignment
 
@@ -174,8 +174,8 @@ def test_support_friction_and_check_rails_change_between_their_unequal_rows():
         friction_table=[[10.0, 0.4, 0.4], [12.0, 0.4, 0.1], [90.0, 0.4, 0.1]],
         check_rail=[{"rail": "left", "flangeway": [[50.0, 0.06], [52.0, 0.04], [70.0, 0.04]]}],
     )
-    found = _changing(np.array([[80.0, 83.0]]), rows, track)
+    found = _changing_ranges(np.array([[80.0, 83.0]]), rows, track)
     expected = [(10.0, 12.0), (40.0, 45.0), (50.0, 50.0), (50.0, 52.0), (70.0, 70.0), (80.0, 83.0)]
     assert sorted(map(tuple, found.tolist())) == expected
     plain = railsim.load_track("straight")
-    assert _changing(np.zeros((0, 2)), np.zeros((0, 3)), plain).shape == (0, 2)
+    assert _changing_ranges(np.zeros((0, 2)), np.zeros((0, 3)), plain).shape == (0, 2)

@@ -28,7 +28,7 @@ def folder(monkeypatch, tmp_path):
 def solved(monkeypatch):
     """Names of what was not found on the disk."""
     calls = []
-    find, judge = equilibrium.equilibrium, step_choice.StepChoice._stable
+    find, judge = equilibrium.equilibrium, step_choice.StepChoice._longest_stable
     monkeypatch.setattr(
         equilibrium, "equilibrium", lambda *a: calls.append("equilibrium") or find(*a)
     )

@@ -13,7 +13,7 @@ import railsim
 from railsim.animation import result_scene
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.support import PRESETS
-from railsim.model.statics import _pressed
+from railsim.model.statics import _shortening
 
 X, Y, Z, ROLL, PITCH, YAW = range(6)
 BAR, BAR_DAMPING, DAMPER = 8e5, 1.5e4, 2e4
@@ -133,8 +133,8 @@ def test_a_spring_is_as_much_pressed_whichever_body_is_named_first(height, force
     named = SimpleNamespace(point1=(0.0, 1.0, height), point2=(0.0, 1.0, 0.0))
     exchanged = SimpleNamespace(point1=named.point2, point2=named.point1)
     travel, acting = np.array([0.0, 0.0, 0.01]), np.array([0.0, 0.0, force])
-    shorter, pressed = _pressed(named, travel, acting, is_link=False)
-    other = _pressed(exchanged, -travel, -acting, is_link=False)
+    shorter, pressed = _shortening(named, travel, acting, is_link=False)
+    other = _shortening(exchanged, -travel, -acting, is_link=False)
     if force or height:
         assert other == (shorter, pressed)
     if not height:

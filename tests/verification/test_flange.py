@@ -151,7 +151,7 @@ def test_state_led_to_another_speed_and_friction_is_the_one_found_there(
     """Wheel forces within 1e-4 of the load, and the growth of a step."""
     track = railsim.load_track(radius_track)
     model, state, load = rolling(name, with_friction(track, friction), speed)
-    led = flange.at_rest_beside(
+    led = flange.at_rest_with(
         model, *flange.in_flange_contact(model, track, state, STEP), 1.2 * speed, 0.05
     )
     other = with_friction(track, friction - 0.05)
@@ -233,12 +233,12 @@ def test_where_the_gauge_is_narrow_a_step_is_judged_as_in_a_curve_of_that_gauge(
 
     model, state, _ = rolling(name, varies, 20.0)
     (wide,) = flange.in_flange_contact(model, varies, state, STEP)
-    (led,) = flange.narrowed(model, varies, wide)
+    (led,) = flange.at_narrowest_gauge(model, varies, wide)
     assert growth_beyond_the_vehicle(model, wide, 2.5e-3) < 1.0
     forces = [wheel_forces(*there) / load for there in (wide, led, at)]
     assert np.abs(forces[0] - forces[2]).max() > 0.1
     assert forces[1] == pytest.approx(forces[2], abs=2e-3)
-    assert flange.narrowed(model, usual, wide) == []
+    assert flange.at_narrowest_gauge(model, usual, wide) == []
 
 
 def curve_of(radius):

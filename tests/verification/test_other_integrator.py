@@ -10,7 +10,7 @@ from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import ARC_LENGTH, N_SCALARS, internal_begin
 from railsim.kernels.support import DOF, SUPPORT_SIZE
-from railsim.model.time_step import empty_recorder, observed
+from railsim.model.time_step import empty_recorder, record_state
 from railsim.model.work import work_arrays
 from railsim.simulation.preparation import prepare
 
@@ -43,7 +43,7 @@ def wheel_forces(model, start, times):
     for values in found.y.T:
         state = start.copy()
         state[entries] = values
-        observed(system, state, recorder)
+        record_state(system, state, recorder)
         forces.append(recorder.wheel[0][:, :, [W_Q, W_Y]])
     return np.moveaxis(np.array(forces), 3, 0)
 

@@ -213,7 +213,7 @@ def test_start_where_the_run_in_leaves_the_rails_comes_over_the_whole_track(stra
     )
     coach = load_vehicle("coach_manchester")
     way = simulate(coach, track, speed=20.0, until=150.0)
-    usual = run_in.settled
+    usual = run_in.settle_in_curve
 
     def refused(model, balance, track, start, step, progress):
         if start > 1.0:

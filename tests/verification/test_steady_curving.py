@@ -21,7 +21,7 @@ from railsim.linear.stationary import WALKING_PACE, on_cant, on_twist, roll_coef
 from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
-from railsim.simulation.run_in import settled
+from railsim.simulation.run_in import settle_in_curve
 from railsim.stability import curving as stability_curving
 from railsim.stability.curving import _Search
 from railsim.track.tables import track_tables
@@ -254,7 +254,7 @@ def test_newton_finds_the_end_of_a_long_run(name, radius):
         plan=[{"type": "CIR", "length": 100.0, "radius": radius}],
         cant=[{"type": "CST", "length": 100.0, "cant": cant}],
     )
-    state = settled(model, balance, there, 50.0, 1e-3)
+    state = settle_in_curve(model, balance, there, 50.0, 1e-3)
     derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
     work = work_arrays(system)
     for _ in range(60):
