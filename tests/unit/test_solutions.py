@@ -33,7 +33,7 @@ def solved(monkeypatch):
         equilibrium, "equilibrium", lambda *a: calls.append("equilibrium") or find(*a)
     )
     monkeypatch.setattr(
-        step_choice.StepChoice, "_stable", lambda *a: calls.append("step") or judge(*a)
+        step_choice.StepChoice, "_longest_stable", lambda *a: calls.append("step") or judge(*a)
     )
     return calls
 

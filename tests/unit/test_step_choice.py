@@ -221,7 +221,7 @@ def test_other_end_of_a_class_has_its_highest_speed_and_lowest_friction(monkeypa
         asked.append((kind, speed, *model.system.track.rail[0, MU_LEFT : MU_RIGHT + 1, 0]))
         return False
 
-    monkeypatch.setattr(step_choice.StepChoice, "_judged", judged)
+    monkeypatch.setattr(step_choice.StepChoice, "_judge_once", judged)
     track = load_track("straight").replace(friction=(0.24, 0.3001))
     prepare(load_vehicle("coach_manchester"), track, Settings(), 20.0, duration=1.0).steps.at(20.0)
     assert asked[0] == ("class", *(pytest.approx(x) for x in (1.2**16, 0.3, 0.4)))

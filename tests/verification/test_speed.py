@@ -220,7 +220,7 @@ def test_start_where_the_run_in_leaves_the_rails_comes_over_the_whole_track(stra
             raise InputError([Fault("--start", "", "off the rails", "another position")])
         return usual(model, balance, track, start, step, progress)
 
-    monkeypatch.setattr(run_in, "settled", refused)
+    monkeypatch.setattr(run_in, "settle_in_curve", refused)
     here = simulate(coach, track, speed=20.0, start=140.0, until=150.0)
     rows = way.distance > 140.0 - 1e-6
     np.testing.assert_allclose(here.Y, way.Y[rows], atol=0.01 * np.max(np.abs(way.Y)))
