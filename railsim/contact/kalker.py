@@ -98,7 +98,7 @@ def kalker_coefficients(
 
     def coefficient(number: int) -> Floats:
         found = [
-            _interpolated(table, number, inside, nu)
+            _interpolate(table, number, inside, nu)
             * (asymptote(number, beyond, nu) / asymptote(number, _G_MIN, nu))
             for table, asymptote in _HALVES
         ]
@@ -120,7 +120,7 @@ def creep_tables(nu: float = 0.28) -> Floats:
     return np.ascontiguousarray(np.stack(kalker_coefficients((1.0 + u) / (1.0 - u), nu), axis=1))
 
 
-def _interpolated(table: Floats, number: int, g: Floats, nu: float) -> Floats:
+def _interpolate(table: Floats, number: int, g: Floats, nu: float) -> Floats:
     """Coefficient `number` of one half of the table at axis ratio g and Poisson's ratio nu."""
     at_nu = [np.interp(g, table[:, 0], table[:, 1 + 3 * number + k]) for k in range(3)]
     n0, n1, n2 = TABLE_POISSON

@@ -123,7 +123,7 @@ class ContactSummary:
     def with_other_normal(self) -> dict[float, LoadedContact]:
         """Return the patches by the other kind of normal contact, for a comparison."""
         table = self.pairs[1].table(self.radii, OTHER_NORMAL[self.normal])
-        return _loaded(table, self.geometry, list(self.contacts), self.load)
+        return _contacts_at(table, self.geometry, list(self.contacts), self.load)
 
     def main_patch(self, friction: float) -> Patch:
         """Return the most loaded patch of the centred right wheel.
@@ -178,7 +178,7 @@ def contact_summary(
         for wheel, rail in zip(wheels, rails, strict=True)
     )
     shifts = [round(share * max_shift, 6) for share in PATCH_SHARES]
-    contacts = _loaded(right.table(radii, normal), geometry, shifts, load)
+    contacts = _contacts_at(right.table(radii, normal), geometry, shifts, load)
     return ContactSummary(
         (left, right),
         radii,
@@ -192,29 +192,29 @@ def contact_summary(
     )
 
 
-def conicity_over_gauge(found: ContactSummary, gauges: Sequence[float]) -> Floats:
+def conicity_over_gauge(summary: ContactSummary, gauges: Sequence[float]) -> Floats:
     """Equivalent conicity, float64[gauge, amplitude], at the amplitudes of a summary [1].
 
     `found`: profiles and their position; `gauges`: track gauges [m]; NaN for one at which the
     wheels do not stand on the rails.
     """
-    left, right = found.pairs
+    left, right = summary.pairs
     rows = []
     for gauge in gauges:
         try:
             geometry = contact_geometry(
                 (left.wheel, right.wheel),
                 (left.rail, right.rail),
-                found.radii,
+                summary.radii,
                 gauge,
                 left.inclination,
                 left.back_to_back,
-                found.geometry.lateral,
+                summary.geometry.lateral,
             )
         except (InputError, ModelError):
-            rows.append(np.full(len(found.amplitudes), np.nan))
+            rows.append(np.full(len(summary.amplitudes), np.nan))
         else:
-            rows.append(geometry.equivalent_conicity(found.amplitudes))
+            rows.append(geometry.equivalent_conicity(summary.amplitudes))
     return np.array(rows)
 
 
@@ -223,7 +223,7 @@ def _roll(geometry: ContactGeometry, y: float) -> float:
     return float(geometry.roll[int(np.argmin(np.abs(geometry.lateral - y)))])
 
 
-def _loaded(
+def _contacts_at(
     table: ContactTable, geometry: ContactGeometry, shifts: Sequence[float], load: float
 ) -> dict[float, LoadedContact]:
     """Patches of the right wheel at the given displacements, where the geometry knows them."""

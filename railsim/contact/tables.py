@@ -15,7 +15,7 @@ _CONICITY = Column("equivalent_conicity", "tan(gamma_e)", "", ".3f")
 MOST_LINES = 20  # of the contact functions that are printed
 
 
-def function_table(found: ContactSummary) -> Table:
+def function_table(summary: ContactSummary) -> Table:
     """Return the contact functions over the lateral displacement."""
     shown = {
         "lateral": ("y", "mm", ".2f"),
@@ -31,46 +31,46 @@ def function_table(found: ContactSummary) -> Table:
         "roll": ("roll", "mrad", ".3f"),
     }
     columns = [Column(name, *how) for name, how in shown.items()]
-    values = found.functions
+    values = summary.functions
     return Table(columns, zip(*(values[name] for name in shown), strict=True))
 
 
-def printed_functions(found: ContactSummary) -> Table:
+def printed_functions(summary: ContactSummary) -> Table:
     """Return some lines of the contact functions, without the positions on the rails."""
-    table = function_table(found)
+    table = function_table(summary)
     step = max((len(table) - 1) // MOST_LINES, 1)
     chosen = [column for column in table.columns if not column.name.startswith("contact_y")]
     return Table(chosen, table.records()[::step])
 
 
-def conicity_table(found: ContactSummary) -> Table:
+def conicity_table(summary: ContactSummary) -> Table:
     """Return the equivalent conicity over the amplitude."""
     columns = [Column("amplitude", unit="mm", format="g"), _CONICITY]
-    return Table(columns, zip(found.amplitudes, found.conicity, strict=True))
+    return Table(columns, zip(summary.amplitudes, summary.conicity, strict=True))
 
 
-def printed_conicity(found: ContactSummary) -> Table:
+def printed_conicity(summary: ContactSummary) -> Table:
     """Return the equivalent conicity of every whole millimetre, side by side."""
-    rows = list(zip(found.amplitudes[1::2], found.conicity[1::2], strict=True))
+    rows = list(zip(summary.amplitudes[1::2], summary.conicity[1::2], strict=True))
     upright = Table([Column("amplitude", unit="mm", format="g"), _CONICITY], rows)
     upright = upright.transposed("amplitude mm")
     upright.caption = "Equivalent conicity (EN 15302)"
-    if np.isnan(found.conicity[1::2]).any():
+    if np.isnan(summary.conicity[1::2]).any():
         upright.caption += "; -: no oscillation with this amplitude within the range"
     return upright
 
 
-def conicity_map_table(found: ContactSummary, gauges: Sequence[float], values: Floats) -> Table:
+def conicity_map_table(summary: ContactSummary, gauges: Sequence[float], values: Floats) -> Table:
     """Return the equivalent conicity, float64[gauge, amplitude], of whole millimetres by gauge."""
-    whole = range(1, len(found.amplitudes), 2)
-    sizes = [f"{1e3 * found.amplitudes[k]:.0f} mm" for k in whole]
+    whole = range(1, len(summary.amplitudes), 2)
+    sizes = [f"{1e3 * summary.amplitudes[k]:.0f} mm" for k in whole]
     columns = [Column(f"amplitude {size}", size, format=".3f") for size in sizes]
     rows = [[gauge, *row[1::2]] for gauge, row in zip(gauges, values, strict=True)]
     title = "Equivalent conicity over gauge and amplitude"
     return Table([Column("gauge", unit="mm", format=".1f"), *columns], rows, title)
 
 
-def patch_table(found: ContactSummary) -> Table:
+def patch_table(summary: ContactSummary) -> Table:
     """Return the contact patches of the right wheel."""
     shown = {
         "lateral": ("y", "mm", ".2f"),
@@ -87,8 +87,8 @@ def patch_table(found: ContactSummary) -> Table:
         "p_max": ("p_max", "MPa", ".0f"),
         "z": ("z", "mm", ".3f"),
     }
-    title = f"Patches of the right wheel under {1e-3 * found.load:.0f} kN"
-    return Table([Column(name, *how) for name, how in shown.items()], found.patches, title)
+    title = f"Patches of the right wheel under {1e-3 * summary.load:.0f} kN"
+    return Table([Column(name, *how) for name, how in shown.items()], summary.patches, title)
 
 
 def creep_table(patch: Patch, rows: Sequence[dict[str, Any]]) -> Table:

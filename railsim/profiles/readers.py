@@ -64,14 +64,14 @@ def _points(file: str, rows: list[Row], **facts: Any) -> Points:
 
 def _row(file: str, texts: list[str], line: int) -> Row:
     if len(texts) < 2:
-        raise _fault(file, line, f"one number instead of two: {_shown(texts)}")
+        raise _fault(file, line, f"one number instead of two: {_excerpt(texts)}")
     y, z = map(_number, texts[:2])
     if y is None or z is None:
-        raise _fault(file, line, f"not a pair of numbers: {_shown(texts)}")
+        raise _fault(file, line, f"not a pair of numbers: {_excerpt(texts)}")
     return y, z, line
 
 
-def _shown(texts: list[str]) -> str:
+def _excerpt(texts: list[str]) -> str:
     text = " ".join(texts)
     return repr(text if len(text) <= 40 else text[:37] + "...")
 
@@ -134,11 +134,11 @@ def _csv(file: str, lines: list[str]) -> Points:
         whole = len(cells) == 4 and all(re.fullmatch(r"[+-]?\d+", cell) for cell in cells)
         if "," in text and ";" not in text and (whole or len(cells) == 2 * named > 0):
             words = f"under {named} names" if named else "without decimal points"
-            found = f"{len(cells)} values {words}: {_shown(cells)}"
+            found = f"{len(cells)} values {words}: {_excerpt(cells)}"
             remedy = "a decimal comma needs semicolons between the columns, or give decimal points"
             raise _fault(file, number, found, remedy)
         if len(cells) <= max(columns):
-            raise _fault(file, number, f"{len(cells)} columns: {_shown(cells)}")
+            raise _fault(file, number, f"{len(cells)} columns: {_excerpt(cells)}")
         rows.append(_row(file, [cells[column] for column in columns], number))
     return _points(file, rows, unit=unit)
 
@@ -163,7 +163,7 @@ def _header(file: str, line: int, names: list[str]) -> tuple[tuple[int, int], fl
     if found:
         return min(found), units[names[min(found)[0]]]
     allowed = "the header is y_mm,z_mm for millimetres or y,z for metres"
-    raise _fault(file, line, f"unknown columns {_shown(names)}", allowed)
+    raise _fault(file, line, f"unknown columns {_excerpt(names)}", allowed)
 
 
 def _simpack(file: str, lines: list[str]) -> Points:
@@ -267,10 +267,10 @@ def _miniprof(file: str, lines: list[str]) -> Points:
                     raise _fault(file, number, f"ColumnDef={value}", allowed)
                 columns = [names.index("X"), names.index("Y")]
             elif "=" not in text and "columndef" in facts:
-                raise _fault(file, number, f"not a pair of numbers: {_shown(words)}")
+                raise _fault(file, number, f"not a pair of numbers: {_excerpt(words)}")
             continue
         if len(words) <= max(columns):
-            raise _fault(file, number, f"{len(words)} columns: {_shown(words)}")
+            raise _fault(file, number, f"{len(words)} columns: {_excerpt(words)}")
         rows.append(_row(file, [words[column] for column in columns], number))
     found = _points(file, rows, unit=1e-3)
     stated = facts.get("xypoints", "") if facts.get("columndef") else ""

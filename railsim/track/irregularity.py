@@ -84,7 +84,7 @@ def shortest_length(track: Track) -> float:
 
     Of records no more than a share of the track, `MOST_ROWS`: there is a remark.
     """
-    return min((_resolved(part, track) for part in track.irregularities), default=np.inf)
+    return min((_resolved_length(part, track) for part in track.irregularities), default=np.inf)
 
 
 def shortest_wave(track: Track) -> float:
@@ -93,11 +93,11 @@ def shortest_wave(track: Track) -> float:
     Infinite from `SHORT` on: where such waves or single disturbances are high, steps are divided.
     """
     parts = [part for part in track.irregularities if not isinstance(part, Single)]
-    shortest = 16.0 * min((_resolved(part, track) for part in parts), default=np.inf)
+    shortest = 16.0 * min((_resolved_length(part, track) for part in parts), default=np.inf)
     return shortest if shortest < SHORT else np.inf
 
 
-def _resolved(part: Irregular, track: Track) -> float:
+def _resolved_length(part: Irregular, track: Track) -> float:
     """Length that tables resolve of an irregularity [m]."""
     least = track.length / MOST_ROWS if isinstance(part, Measured) else 0.0
     return max(part.resolution(), least)

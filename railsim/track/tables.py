@@ -122,12 +122,12 @@ def _centre_line(alignment: Alignment, s: Floats, origin: int) -> list[tuple[Flo
     return list(zip(position, _direction(alignment, s), strict=True))
 
 
-def _rails(track: Track, moved: Displacement | None, s: Floats) -> Floats:
+def _rails(track: Track, displacement: Displacement | None, s: Floats) -> Floats:
     """Displacements and friction of both rails, float64[n_cells, 6, 4]."""
     ds = s[1] - s[0]
     rail = np.zeros((s.size - 1, 6, 4))
-    if moved is not None:
-        for row, (value, rate) in enumerate(zip(*moved(s), strict=True)):
+    if displacement is not None:
+        for row, (value, rate) in enumerate(zip(*displacement(s), strict=True)):
             rail[:, row] = hermite(value, rate, ds)
     mu = track.friction_at(s)
     rail[:, 4:, 0], rail[:, 4:, 1] = mu[:-1], np.diff(mu, axis=0) / ds
