@@ -56,9 +56,9 @@ def command(
     from railsim.assessment.record import RUNNING
     from railsim.assessment.running import OF_LIMITS, by_vehicle
     from railsim.assessment.tables import assessment_lines
-    from railsim.studies.gathered import opened, without_file
+    from railsim.studies.gathered import open_results, without_file
 
-    results = opened(_paths(files))
+    results = open_results(_paths(files))
     for file in files:
         try:
             missing = without_file(Path(file))
@@ -100,7 +100,7 @@ def _service(results: "dict[str, Result]", options: dict[str, Any]) -> "Service 
         return None
     from railsim.assessment.running import common_service
     from railsim.definitions.vehicle.tables import Service
-    from railsim.studies.spec import checked
+    from railsim.studies.spec import validated
 
     def of_option(fault: Fault) -> Fault:
         found = f"found {changes.get(fault.key, 'nothing')}"
@@ -109,7 +109,7 @@ def _service(results: "dict[str, Result]", options: dict[str, Any]) -> "Service 
 
     service = common_service(results, changes)
     with changed_faults(of_option):
-        return checked(Service, {**(service.model_dump() if service else {}), **changes}, "")
+        return validated(Service, {**(service.model_dump() if service else {}), **changes}, "")
 
 
 def write_assessments(output: cli.Output, assessments: "Sequence[Assessment]") -> None:

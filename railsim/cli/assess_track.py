@@ -49,7 +49,7 @@ def command(
     how |= {"out": str(output.out), "overwrite": output.overwrite}
     driven = [speed_of(text) for text in speeds]
     with output.progress("assess-track") as progress:
-        how["beside"] = "places.csv", "sections.csv", "heat_strip.png", "report.html"
+        how["further_files"] = "places.csv", "sections.csv", "heat_strip.png", "report.html"
         found = assess_track(recording, vehicles, driven, progress=progress, **how)
     output.written += found.write()
     table, strip = found.table(), heat_strip(found.cells, found.shares, CELL)

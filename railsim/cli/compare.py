@@ -113,11 +113,11 @@ def _groups(files: tuple[str, ...], output: cli.Output) -> dict[str, Group]:
 
     Raises InputError: what cannot be compared, with the reason.
     """
-    from railsim.studies.gathered import opened
+    from railsim.studies.gathered import open_results
 
     folders = [file for file in files if os.path.isdir(file)]
     if not folders:
-        results = opened([Path(file) for file in files])
+        results = open_results([Path(file) for file in files])
         if len(files) < 2:
             raise input_error("R2.h5", "one result", "give two results at least")
         return {"": results}

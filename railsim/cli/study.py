@@ -124,13 +124,13 @@ def command(
     from railsim.studies.plan import faults_of_file
     from railsim.studies.spec import Execution
     from railsim.studies.study import run_study, stored_spec
-    from railsim.studies.user_function import given_again
+    from railsim.studies.user_function import function_to_resume
 
     inputs = {**asked, "grid": _grid(asked["grid"]), "start": asked["start"] or 0.0}
     inputs |= {"assignments": given.overrides, "settings": given.settings}
     if resume and file is None and not any(inputs.values()):
         spec, base = stored_spec(folder)
-        spec = spec.changed(quantities=given_again(spec.quantities, quantities))
+        spec = spec.changed(quantities=function_to_resume(spec.quantities, quantities))
         folder = folder if base == Path.cwd() else folder.absolute()
         if spec.scenario is not None:
             resumed = {"assignments": tuple(spec.assignments), "resume": True}
@@ -145,7 +145,7 @@ def command(
     with chdir(base), own, output.studying("study") as studying:
         on_record = None if output.quiet or output.as_json else lines
         beside = ("report.html",) * report
-        how |= {"resume": resume, "on_record": on_record, "beside": beside, **studying}
+        how |= {"resume": resume, "on_record": on_record, "further_files": beside, **studying}
         outcome = run_study(spec, folder, Execution(**how))
         if report:
             from railsim.cli.report import write_report
@@ -200,7 +200,7 @@ def _campaign(
     faults.check()
     lines = RunLines()
     how["on_record"] = None if output.quiet or output.as_json else lines
-    how["beside"] = *FILES, *("report.html",) * report
+    how["further_files"] = *FILES, *("report.html",) * report
     with output.studying(scenario) as studying:
         done = campaign(scenario, list(vehicles), out=str(output.out), **studying, **how)
     write_assessments(output, done.assessments)
@@ -229,7 +229,7 @@ def _spec(
 ) -> "StudySpec":
     """Return the study of the options, or of a file with the assignments of the options."""
     from railsim.definitions.loading import load_study
-    from railsim.studies.spec import StudySpec, checked
+    from railsim.studies.spec import StudySpec, validated
     from railsim.studies.user_function import full_name
 
     if file is None:
@@ -237,7 +237,7 @@ def _spec(
         words = "not given", "give one value at least"
         Faults(Fault(f"--{name}", "", *words) for name in missing).check()
         named = {"quantities": full_name(quantities)}
-        return checked(StudySpec, {**kept, **inputs, **named}, "study")
+        return validated(StudySpec, {**kept, **inputs, **named}, "study")
     cli.refused("given together with a study file", "the file holds it", *OF_FILE).check()
     study = load_study(file)
     if study.optimise is not None:

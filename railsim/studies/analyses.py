@@ -31,15 +31,15 @@ LARGEST = ("Q", "Y", "Y_over_Q", "dQ_over_Q0", "sum_Y", "attack", "lateral", "ca
 LOCATIONS = ("x", "blocks", "wheelset")  # of comfort points and wheels
 
 
-def analysed(case: "Case", result: Result | None) -> tuple[Numbers, list[str]]:
+def numbers_and_remarks(case: "Case", result: Result | None) -> tuple[Numbers, list[str]]:
     """Return the numbers of all analyses of a case, and remarks; raises InputError, ModelError."""
-    found: Numbers = {}
-    said: list[str] = []
+    all_numbers: Numbers = {}
+    all_remarks: list[str] = []
     for name, analysis in case.analyses.items():
         numbers, remarks = _ACTIONS[type(analysis)](case, analysis, result)
-        found |= {f"{name}.{key}": value for key, value in numbers.items()}
-        said += [f"{name}: {remark}" for remark in remarks]
-    return found, said
+        all_numbers |= {f"{name}.{key}": value for key, value in numbers.items()}
+        all_remarks += [f"{name}: {remark}" for remark in remarks]
+    return all_numbers, all_remarks
 
 
 def numbers_of(analysis: Analysis) -> tuple[str, ...]:
@@ -55,12 +55,12 @@ def check_analyses(analyses: Mapping[str, Analysis]) -> None:
     """Raise InputError: what is out of range in analyses, as it would be at every point."""
     faults = Faults()
     for name, analysis in analyses.items():
-        own = Faults()
-        with own.caught():
+        caught = Faults()
+        with caught.caught():
             _check(analysis)
         faults += [
             Fault("study", f"analyses.{name}.{one.file}", one.found, one.allowed, "--analyses")
-            for one in own
+            for one in caught
             if getattr(analysis, one.file) is not None  # else that of the point
         ]
     faults.check()
@@ -83,7 +83,7 @@ def _check(analysis: Analysis) -> None:
             checked(contact, analysis.methods, analysis.low, analysis.high)
 
 
-def _assessed(case: "Case", analysis: AssessAnalysis, result: Result | None) -> Outcome:
+def _assessment_numbers(case: "Case", analysis: AssessAnalysis, result: Result | None) -> Outcome:
     """Largest share of each limit and value of a section; values of comfort, wear and safety.
 
     None, and a remark, where a run ended too early for them: what it is, its status says.
@@ -94,29 +94,29 @@ def _assessed(case: "Case", analysis: AssessAnalysis, result: Result | None) -> 
 
     assert result is not None  # a case with this analysis has a run
     try:
-        (found,) = assess(result, analysis.standard, limits=analysis.limits, coarse=True)
+        (assessment,) = assess(result, analysis.standard, limits=analysis.limits, coarse=True)
     except TooShort as error:
         if result.status == "complete":
             raise
         return {}, (f"{LEFT_OUT}{error}",)
     shares: dict[str, float] = {}
-    for row in found.worst:
+    for row in assessment.worst:
         if not math.isnan(row.share):
             name = row.criterion.name
             shares[name] = max(row.share, shares.get(name, 0.0))
     numbers = {f"{name}_share": share for name, share in shares.items()}
     if shares:
         numbers["largest_share"] = max(shares.values())
-    if found.verdict:
-        numbers["exceeded"] = float(found.exceeded)
-    judged = {row.criterion.name for row in found.worst}
-    for section in (one for report in found.zones for one in report.values):
+    if assessment.verdict:
+        numbers["exceeded"] = float(assessment.exceeded)
+    judged = {row.criterion.name for row in assessment.worst}
+    for section in (one for report in assessment.zones for one in report.values):
         for (quantity, _), values in section.values.items():
             if quantity in judged:
                 name = f"{quantity}_largest"
                 numbers[name] = max(*values, numbers.get(name, -math.inf))
-    said = coarse_remarks(case.settings, case.speed)
-    return {**numbers, **_largest(found.record(), analysis.standard)}, said
+    remarks = coarse_remarks(case.settings, case.speed)
+    return {**numbers, **_largest(assessment.record(), analysis.standard)}, remarks
 
 
 def _largest(record: Mapping[str, Any], standard: str) -> Numbers:
@@ -124,13 +124,13 @@ def _largest(record: Mapping[str, Any], standard: str) -> Numbers:
     if standard not in ("comfort", "wear", "safety"):
         return {}
     ((_, report),) = record[standard].items()
-    found: Numbers = {}
+    largest: Numbers = {}
     if standard == "safety":
         report = [*report["wheels"], {"overturning": report["overturning"]}]
     for row in report:
         for key, value in _numbers(row):
-            found[key] = max(found.get(key, 0.0), abs(value))
-    return found
+            largest[key] = max(largest.get(key, 0.0), abs(value))
+    return largest
 
 
 def _numbers(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, float]]:
@@ -146,13 +146,13 @@ def _modes(case: "Case", analysis: ModesAnalysis, result: Result | None) -> Outc
     """Damping ratio and frequency of the least damped oscillation from 0.3 to 40 Hz."""
     from railsim.linear.modes import modes
 
-    found = modes(
+    eigenmodes = modes(
         case.vehicle, case.track, speed=case.speed, settings=case.settings, **_contact(analysis)
     )
-    least = found.least_damped
+    least = eigenmodes.least_damped
     if least is None:
         raise ModelError("no oscillation from 0.3 to 40 Hz")
-    return {"damping": least.damping_ratio, "frequency": least.frequency}, found.remarks
+    return {"damping": least.damping_ratio, "frequency": least.frequency}, eigenmodes.remarks
 
 
 def _critical_speed(
@@ -161,7 +161,7 @@ def _critical_speed(
     """Critical speeds by method; an end of the search where it hunts at no speed, or at all."""
     from railsim.stability.critical_speed import critical_speed
 
-    found = critical_speed(
+    speeds = critical_speed(
         case.vehicle,
         case.track,
         methods=analysis.methods,
@@ -171,13 +171,13 @@ def _critical_speed(
         settings=case.settings,
         **_contact(analysis),
     )
-    if found.linear is not None:
-        numbers = {"linear": found.linear.speed, "frequency": found.linear.frequency}
+    if speeds.linear is not None:
+        numbers = {"linear": speeds.linear.speed, "frequency": speeds.linear.frequency}
     else:
-        numbers = {"linear": analysis.low if found.unstable_at_low else analysis.high}
-    for method, point in found.nonlinear.items():
+        numbers = {"linear": analysis.low if speeds.unstable_at_low else analysis.high}
+    for method, point in speeds.nonlinear.items():
         numbers[method] = analysis.high if point is None else point.speed
-    return numbers, found.remarks
+    return numbers, speeds.remarks
 
 
 def _contact(analysis: ModesAnalysis | CriticalSpeedAnalysis) -> dict[str, Any]:
@@ -193,7 +193,7 @@ def _curving(case: "Case", analysis: CurvingAnalysis, result: Result | None) -> 
     deficiency = analysis.cant_deficiency
     if deficiency is None:
         deficiency = cant_deficiency(case.speed, 1.0 / abs(analysis.radius), analysis.cant)
-    found = curving(
+    states = curving(
         case.vehicle,
         radius=[analysis.radius],
         cant=analysis.cant,
@@ -201,21 +201,21 @@ def _curving(case: "Case", analysis: CurvingAnalysis, result: Result | None) -> 
         track=case.track,
         settings=case.settings,
     )
-    if found.converged.item() == FAILED:
+    if states.converged.item() == FAILED:
         raise ModelError(
             f"R {analysis.radius:g} m: the vehicle leaves the track, or no step is stable"
         )
-    numbers = {name: float(np.max(np.abs(getattr(found, name)))) for name in LARGEST}
-    numbers["Y_over_Q"] = float(np.max(found.Y_over_Q))  # inwards: no derailment
-    numbers["sum_abs_Y"] = float(np.max(np.abs(found.Y).sum(axis=-1)))
-    numbers["T_gamma"] = float(np.sum(found.T_gamma))
-    numbers["T_gamma_largest"] = float(np.max(found.T_gamma))
-    return numbers, found.remarks
+    numbers = {name: float(np.max(np.abs(getattr(states, name)))) for name in LARGEST}
+    numbers["Y_over_Q"] = float(np.max(states.Y_over_Q))  # inwards: no derailment
+    numbers["sum_abs_Y"] = float(np.max(np.abs(states.Y).sum(axis=-1)))
+    numbers["T_gamma"] = float(np.sum(states.T_gamma))
+    numbers["T_gamma_largest"] = float(np.max(states.T_gamma))
+    return numbers, states.remarks
 
 
 _ACTIONS: dict[type[Any], Callable[..., Outcome]] = {
     RunAnalysis: lambda *_: ({}, ()),  # peaks and mid-curve values, as in every study
-    AssessAnalysis: _assessed,
+    AssessAnalysis: _assessment_numbers,
     ModesAnalysis: _modes,
     CriticalSpeedAnalysis: _critical_speed,
     CurvingAnalysis: _curving,

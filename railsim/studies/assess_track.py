@@ -68,7 +68,7 @@ class Place:
     vehicle: str
     speed: float  # [m/s]
     quantity: str  # of `QUANTITIES`
-    where: str  # wheel, wheelset or point
+    of_status: str  # wheel, wheelset or point
     s: float  # of that wheelset or point [m]
     value: float  # [SI]
     limit: float  # [SI]
@@ -123,7 +123,7 @@ class TrackAssessment:
         for p in self.places:
             shown = QUANTITIES[p.quantity]
             value = Amount(p.value, shown, with_unit=True)
-            rows.append([p.vehicle, p.speed, p.s, shown.name, p.where, value, p.value / p.limit,
+            rows.append([p.vehicle, p.speed, p.s, shown.name, p.of_status, value, p.value / p.limit,
                          p.shape, *[p.mileage] * own])  # fmt: skip
         return Table(columns, rows)
 
@@ -185,7 +185,7 @@ def assess_track(
         raise argument_error("share", f"found {share:.12g}", "above 0, up to 10")
     folder = Path(out)
     check_folder(folder)
-    track = recorded(recording)
+    track = load_recorded_track(recording)
     tested = {short_name(name): load_vehicle(name) for name in vehicles}
     if len(tested) < len(vehicles):
         found = f"found {', '.join(map(short_name, vehicles))}"
@@ -226,13 +226,13 @@ def assess_track(
         single=True, keep=",".join([*quantities, "sensor_acceleration"]),
     )  # fmt: skip
     outcome = carry_out_cases([case for case, *_ in runs], spec, folder, **how)
-    ended = outcome.records.where(lambda status: status != "complete")
+    ended = outcome.records.of_status(lambda status: status != "complete")
     remarks = [f"{one['name']}: {one['status']}, {one['status_reason']}" for one in ended]
-    remarks += _left_out(track) + _hunting(outcome.records) + measured_remarks(track)
-    return _judged(track, runs, share, outcome, remarks)
+    remarks += _omissions(track) + _hunting_remarks(outcome.records) + measured_remarks(track)
+    return _assessment(track, runs, share, outcome, remarks)
 
 
-def _hunting(records: Sequence[Mapping[str, Any]]) -> list[str]:
+def _hunting_remarks(records: Sequence[Mapping[str, Any]]) -> list[str]:
     """Remark on vehicles that hunt: what they exceed is not the track's."""
     runs: dict[tuple[str, float], list[bool]] = {}
     for record in records:
@@ -246,7 +246,7 @@ def _hunting(records: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
 
 
-def recorded(recording: str | Path) -> Track:
+def load_recorded_track(recording: str | Path) -> Track:
     """Return a track with a recording, straight for a CSV; raises InputError: it has none."""
     if str(recording).lower().endswith(".csv"):
         irregular = [{"type": "measured", "file": str(Path(recording).resolve())}]
@@ -270,15 +270,15 @@ def _behind(vehicle: Vehicle) -> float:
     return -min(0.0, *wheelsets, *(placed[point].along for point in POINTS))
 
 
-def _recorded_from_to(track: Track) -> tuple[float, float]:
+def _recorded_extent(track: Track) -> tuple[float, float]:
     """Where the recordings begin and end, on the track or beyond it [m]."""
     found = [p.extent(track.length) for p in track.irregularities if isinstance(p, Measured)]
     return min(a for a, _ in found), max(b for _, b in found)
 
 
-def _left_out(track: Track) -> list[str]:
+def _omissions(track: Track) -> list[str]:
     """Remark on what of a recording lies beyond the track and is not judged."""
-    (low, high), (begin, end) = _recorded_from_to(track), _extent(track)
+    (low, high), (begin, end) = _recorded_extent(track), _extent(track)
     if low > begin - 1.0 and high < end + 1.0:
         return []
     return [
@@ -289,7 +289,7 @@ def _left_out(track: Track) -> list[str]:
 
 def _extent(track: Track) -> tuple[float, float]:
     """Where a recording begins and ends on its track [m]."""
-    low, high = _recorded_from_to(track)
+    low, high = _recorded_extent(track)
     begin, end = max(0.0, low), min(track.length, high)
     if end - begin < 2.0 * SECTION:
         found_words, allowed = f"{end - begin:.0f} m", f"{2.0 * SECTION:g} m at least"
@@ -325,11 +325,11 @@ def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
 # what the runs say --------------------------------------------------------------------------------
 
 
-def _judged(
+def _assessment(
     track: Track, runs: Sequence[_Run], share: float, outcome: Outcome, remarks: Sequence[str]
 ) -> TrackAssessment:
     begin, end = _extent(track)
-    cells, known = np.arange(begin, end, CELL), bool(track.mileage or track.falling_mileage)
+    cells, has_mileage = np.arange(begin, end, CELL), bool(track.mileage or track.falling_mileage)
     geometry = RecordedGeometry(track, begin, end)
     shares: dict[tuple[str, float, str], Floats] = {}
     places: list[Place] = []
@@ -340,7 +340,7 @@ def _judged(
         if not path.is_file():
             continue
         name = str(case.labels["vehicle"])
-        for quantity, where, s, value, limit in _signals(case, open_result(path)):
+        for quantity, location, s, value, limit in _signals(case, open_result(path)):
             s = s + moved
             inside = (s >= a) & (s < b)
             if not inside.any():
@@ -353,16 +353,16 @@ def _judged(
                 lifted[cell[gaps]] = True
                 unloaded.setdefault((name, case.speed), []).append(float(s[gaps][0]))
             for k in _peaks(s, part, share):
-                there, magnitude = float(s[k]), float(part[k] * limit)
-                km = float(track.mileage_at(there)) if known else None
-                shape = geometry.shape(there)
+                place, magnitude = float(s[k]), float(part[k] * limit)
+                km = float(track.mileage_at(place)) if has_mileage else None
+                shape = geometry.shape(place)
                 places.append(
-                    Place(name, case.speed, quantity, where, there, magnitude, limit, shape, km)
+                    Place(name, case.speed, quantity, location, place, magnitude, limit, shape, km)
                 )
-    asked = len({(case.labels["vehicle"], case.speed) for case, *_ in runs}) * len(QUANTITIES)
+    expected = len({(case.labels["vehicle"], case.speed) for case, *_ in runs}) * len(QUANTITIES)
     rows = np.array([*shares.values()]).reshape(-1, len(cells))
     exceeded = np.any(rows > share, axis=0) | lifted
-    unknown = ~lifted & (np.isnan(rows).any(axis=0) | (len(shares) < asked))
+    unknown = ~lifted & (np.isnan(rows).any(axis=0) | (len(shares) < expected))
     lifting = (
         f"{vehicle} lifts a wheel at {3.6 * speed:.0f} km/h, first at s = {min(s):.0f} m: Y/Q has "
         "no value there, and its sections are flagged."
@@ -382,12 +382,12 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
     assert isinstance(service, Service)  # checked before
 
     def limit(name: str, wheelset: int | None = None, Q0: float = 0.0) -> float:
-        at = Situation(case.vehicle, service, "1", np.inf, wheelset, Q0, laws)
-        return float(laws[name].at(at))
+        situation = Situation(case.vehicle, service, "1", np.inf, wheelset, Q0, laws)
+        return float(laws[name].at(situation))
 
-    found: list[tuple[str, str, Floats, Floats, float]] = []
-    load, at = result["Q0"].mean(axis=1), result["wheelset_distance"]
-    rate = len(at) / float(result["time"][-1] - result["time"][0])
+    signals: list[tuple[str, str, Floats, Floats, float]] = []
+    load, s = result["Q0"].mean(axis=1), result["wheelset_distance"]
+    rate = len(s) / float(result["time"][-1] - result["time"][0])
     window = max(1, round(SLIDING / case.speed * rate))
     Q, Y = (low_passed(result[name], rate, LOW_PASS) for name in "QY")
     quotient = np.where(np.isnan(result["Y_over_Q"]), np.nan, outward_quotient(Y, Q))
@@ -398,7 +398,7 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
         known = uniform_filter1d(np.where(unknown, 0.0, x), window)
         return np.where(maximum_filter1d(unknown, window), np.nan, known)
 
-    for w in range(at.shape[1]):
+    for w in range(s.shape[1]):
         number = f"wheelset {w + 1}"
         values = []
         for side, word in enumerate(SIDES):
@@ -406,14 +406,14 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
             values.append(("Q", place, Q[:, w, side]))
             values.append(("Y_over_Q", place, mean(quotient[:, w, side])))
         values.append(("sum_Y", number, np.abs(mean(Y[:, w].sum(axis=-1)))))
-        found += [(n, place, at[:, w], x, limit(n, w, float(load[w]))) for n, place, x in values]
+        signals += [(n, place, s[:, w], x, limit(n, w, float(load[w]))) for n, place, x in values]
     placed = sensors(case.vehicle)
     for point, axis in product(POINTS, "yz"):
         x = result.series("sensor_acceleration", sensor=point, axis=axis)
         x = passed(x, rate, RIDE_BAND)  # what is steady in curves has a limit of its own
         name, s = f"body_{axis}", result["distance"] + placed[point].along
-        found.append((name, point, s, np.abs(x), limit(name)))
-    return found
+        signals.append((name, point, s, np.abs(x), limit(name)))
+    return signals
 
 
 def _peaks(s: Floats, part: Floats, share: float) -> list[int]:

@@ -42,7 +42,7 @@ from railsim.studies.carry_out import carry_out_cases
 from railsim.studies.case import Case, Loader, load_case, short_name
 from railsim.studies.plan import ROUGH_DURATION, check_number, faults_of_file
 from railsim.studies.rows import in_a_name
-from railsim.studies.spec import RunSpec, StudySpec, checked
+from railsim.studies.spec import RunSpec, StudySpec, validated
 from railsim.track.curves import curves
 
 _LOG = logging.getLogger(__name__)
@@ -196,9 +196,9 @@ def scenario_cases(
                 labels["condition"] = state
             case = replace(
                 case, name="_".join(filter(None, label)), vehicle=made, labels=labels,
-                track=fitted_curves(case.track, part.speed, service, limits),
+                track=with_fitted_curves(case.track, part.speed, service, limits),
             )  # fmt: skip
-            cases += repeated(case, limits, service, number) if limits else [case]
+            cases += repetitions(case, limits, service, number) if limits else [case]
     Faults(dict.fromkeys(faults)).check()
     return cases
 
@@ -248,17 +248,17 @@ def check_parts(scenario: Scenario, file: str, assignments: Sequence[str] = ()) 
 
 def _curve_faults(track: Track, part: Part, file: str, key: str) -> Iterator[Fault]:
     """Yield in what the curve of a part's speed, at `key`, is beyond those of its track."""
-    found = [(1.0 / abs(one.curvature), 1e3 * abs(one.cant)) for one in curves(track)]
+    sizes = [(1.0 / abs(curve.curvature), 1e3 * abs(curve.cant)) for curve in curves(track)]
     speed, of_track = part.speed, f"'{short_name(part.track)}'"
-    given = (("radius", "m", speed.radius or 0.0), ("cant", "mm", 1e3 * abs(speed.cant)))
-    if not found:
+    requested = (("radius", "m", speed.radius or 0.0), ("cant", "mm", 1e3 * abs(speed.cant)))
+    if not sizes:
         yield Fault(file, f"{key}.radius", f"{speed.radius:g} m", f"{of_track} has no curve")
-    for (own, unit, value), known in zip(given, zip(*found, strict=True), strict=False):
-        low, high = min(known), max(known)
+    for (name, unit, value), values in zip(requested, zip(*sizes, strict=True), strict=False):
+        low, high = min(values), max(values)
         if not 0.999 * low - 1e-6 <= value <= 1.001 * high + 1e-6:
             ends = " to ".join(dict.fromkeys(f"{end:.6g}" for end in (low, high)))
             allowed = f"{ends} {unit} in the curves of {of_track}"
-            yield Fault(file, f"{key}.{own}", f"{value:.12g} {unit}", allowed)
+            yield Fault(file, f"{key}.{name}", f"{value:.12g} {unit}", allowed)
 
 
 def part_speed(speed: Speed, service: Service) -> float:
@@ -299,10 +299,10 @@ def in_condition(vehicle: Vehicle, name: str, condition: TestCondition) -> Vehic
             allowed = "a key of the vehicle's file"
             raise input_error(f"conditions.{name}", key, allowed, key="remove") from None
     data.setdefault("service", {}).update(condition=name.replace("_", " "), fault=condition.fault)
-    return checked(Vehicle, data, f"conditions.{name}")
+    return validated(Vehicle, data, f"conditions.{name}")
 
 
-def fitted_curves(
+def with_fitted_curves(
     track: Track, speed: Speed, service: Service, limits: RunningLimits | None = None
 ) -> Track:
     """Track whose curves give the cant deficiency asked for at the speed of the part.
@@ -314,31 +314,31 @@ def fitted_curves(
     """
     if speed.cant_deficiency is None or speed.radius is None:
         return track
-    at, as_drawn = part_speed(speed, service), _speed_in_curve(speed, service)
+    at_part, as_drawn = part_speed(speed, service), _speed_in_curve(speed, service)
     factor, plan = 1.0, list(track.plan)
     if speed.admissible is not None:
         radii = [abs(element.radius) for element in plan if isinstance(element, Circle)]
         ranges = [zone.radius for zone in limits.zones.values() if zone.radius] if limits else []
         ends = [low / min(radii) for low, high in ranges if low <= speed.radius <= high]
-        factor = max((at / as_drawn) ** 2, min(1.0, 1.001 * max(ends, default=0.0)))
+        factor = max((at_part / as_drawn) ** 2, min(1.0, 1.001 * max(ends, default=0.0)))
     for k, element in enumerate(plan):
         if isinstance(element, Circle):
             plan[k] = element.model_copy(update={"radius": factor * element.radius})
-    permitted = track.speed and track.speed * at / as_drawn
+    permitted = track.speed and track.speed * at_part / as_drawn
     changed: dict[str, Any] = {"plan": (*plan,), "speed": permitted}
-    wanted = speed.cant_deficiency * service.cant_deficiency
-    cant = max(0.0, cant_deficiency(at, 1.0 / (factor * speed.radius), wanted))
+    deficiency = speed.cant_deficiency * service.cant_deficiency
+    cant = max(0.0, cant_deficiency(at_part, 1.0 / (factor * speed.radius), deficiency))
     if cant < speed.cant - 1e-6:  # m
-        changed["cant"] = tuple(_lowered(one, cant / speed.cant) for one in track.cant or ())
+        changed["cant"] = tuple(_lowered(each, cant / speed.cant) for each in track.cant or ())
     return track.model_copy(update=changed)
 
 
 def _lowered(element: CantElement, factor: float) -> CantElement:
-    given = {key: getattr(element, key) for key in element.KEYS}
-    return element.model_copy(update={k: factor * v for k, v in given.items() if v is not None})
+    cants = {key: getattr(element, key) for key in element.KEYS}
+    return element.model_copy(update={k: factor * v for k, v in cants.items() if v is not None})
 
 
-def repeated(case: Case, limits: RunningLimits, service: Service, condition: int) -> list[Case]:
+def repetitions(case: Case, limits: RunningLimits, service: Service, condition: int) -> list[Case]:
     """Return a run with as many seeds as its zone needs sections, each to the target quality.
 
     `case`: run on track with one random irregularity; others are returned as they are; `condition`:

@@ -62,8 +62,8 @@ def carry_out_cases(cases: Sequence[Case], spec: StudySpec, folder: Path, **how:
     check_names(points)
     by_point = dict(zip(points, cases, strict=True))
 
-    def load(wanted: Sequence[Point]) -> list[Case]:
-        return [by_point[point] for point in wanted]
+    def load(requested: Sequence[Point]) -> list[Case]:
+        return [by_point[point] for point in requested]
 
     return carry_out(points, load, spec, folder, Execution(longest_first=True, **how))
 
@@ -76,31 +76,31 @@ def carry_out(
     `load`: loads the inputs of some of the points. Raises InputError: an unknown quantity to keep;
     a folder of another study; as `State`.
     """
-    inputs, keep = spec.stored(), kept_quantities(spec.keep)
-    beside = list(execution.beside)
+    inputs, keep = spec.as_data(), kept_quantities(spec.keep)
+    further_files = list(execution.further_files)
     for point in points if execution.plots else ():
-        beside += f"{point.name}.png", comparison_picture(point.name, point.labels)
-    check_folder(folder, (*FILES, *dict.fromkeys(beside)), overwrite=True)
+        further_files += f"{point.name}.png", comparison_picture(point.name, point.labels)
+    check_folder(folder, (*FILES, *dict.fromkeys(further_files)), overwrite=True)
     remark = execution.on_remark or _LOG.warning
     with ExitStack() as stack:
-        known = None
+        previous = None
         if is_file(folder / JOURNAL):
-            known = stack.enter_context(Journal(folder))
+            previous = stack.enter_context(Journal(folder))
         if not (execution.resume or execution.overwrite):
-            _refuse_another_study(folder, known, inputs)
-        if known is None and not execution.overwrite:
-            _refuse_files_of_others(folder, beside)
-        state = State(folder, points, load, spec, known, execution)
+            _refuse_another_study(folder, previous, inputs)
+        if previous is None and not execution.overwrite:
+            _refuse_files_of_others(folder, further_files)
+        state = State(folder, points, load, spec, previous, execution)
         client = None if execution.scheduler is None else execute.cluster(execution.scheduler)
         make_folder(folder)
         sweep(folder)
-        journal = known or stack.enter_context(Journal(folder))
+        journal = previous or stack.enter_context(Journal(folder))
         if execution.overwrite:
             journal.clear()
-        elif known is None and journal.entries:
+        elif previous is None and journal.entries:
             raise argument_error("out", f"another study has begun in {folder}")
         journal.begin(inputs)
-        unused = (f"{one} has no effect: the study varies its key" for one in spec.overruled)
+        unused = (f"{text} has no effect: the study varies its key" for text in spec.overruled)
         for text in (*unused, *state.settle(journal)):
             remark(text)
         jobs = _jobs(state, spec, keep, folder, execution)
@@ -108,7 +108,7 @@ def carry_out(
             if jobs:
                 with suppress(FileNotFoundError):  # it would be out of date
                     (folder / "study.json").unlink()
-            for record in _computed(jobs, client, execution, remark):
+            for record in _compute(jobs, client, execution, remark):
                 has_file = record["status"] != "failed" and record["file"]
                 file = (folder / record["file"]).stat() if has_file else None
                 journal.add(record, state.keys[record["name"]], file)
@@ -121,7 +121,7 @@ def carry_out(
                 write_index(folder, inputs, "interrupted", state.records(journal))
             raise
         whole = len(points) > MANY and _is_newer(folder / "study.json", journal.path)
-        if jobs or state.found or not whole:
+        if jobs or state.existing or not whole:
             write_index(folder, inputs, "complete", state.records(journal))
         return Outcome(folder, state.records(journal), len(jobs))
 
@@ -134,14 +134,14 @@ def _jobs(
     for case in state.cases:
         path = (folder / f"{case.name}.h5").resolve()
         picture = path.with_suffix(".png") if execution.plots and case.file_name else None
-        known = state.to_be_analysed.get(case.name)
-        jobs.append(execute.Job(case, path, picture, spec.quantities, keep, storage, known))
+        record = state.to_be_analysed.get(case.name)
+        jobs.append(execute.Job(case, path, picture, spec.quantities, keep, storage, record))
     if execution.longest_first:
         jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
     return jobs
 
 
-def _computed(
+def _compute(
     jobs: Sequence[execute.Job], client: Any, execution: Execution, remark: Callable[[str], None]
 ) -> Iterable[Record]:
     progress = execution.progress or (lambda _: None)
@@ -162,26 +162,26 @@ def comparison_picture(name: str, labels: Mapping[str, str | float]) -> str:
 
 
 def _refuse_another_study(
-    folder: Path, known: Journal | None, inputs: Mapping[str, object]
+    folder: Path, previous: Journal | None, inputs: Mapping[str, object]
 ) -> None:
-    there = known.inputs if known else None
-    if there is None:
+    stored = previous.inputs if previous else None
+    if stored is None:
         try:
-            there = read_index(folder / "study.json").inputs.stored()
+            stored = read_index(folder / "study.json").inputs.as_data()
         except InputError:
             return
     unread = ("folder", "name", "purpose")  # no number depends on them
-    asked = {name: value for name, value in inputs.items() if name not in unread}
-    differing = [name for name, value in asked.items() if there.get(name, value) != value]
+    requested = {name: value for name, value in inputs.items() if name not in unread}
+    differing = [name for name, value in requested.items() if stored.get(name, value) != value]
     if differing:
         found = f"{folder} holds a study with other " + ", ".join(differing)
         allowed = "`resume` continues with these inputs, `overwrite` computes everything; "
         raise argument_error("out", found, f"{allowed}or another `out`")
 
 
-def _refuse_files_of_others(folder: Path, beside: Sequence[str]) -> None:
-    """Refuse files that a study, or what comes `beside` it, would replace and that are of none."""
-    index, names = folder / "study.json", ("summary.csv", *beside)
+def _refuse_files_of_others(folder: Path, further_files: Sequence[str]) -> None:
+    """Refuse files that a study, with `further_files`, would replace and that are of none."""
+    index, names = folder / "study.json", ("summary.csv", *further_files)
     if is_file(index):
         try:
             read_index(index)
@@ -190,7 +190,7 @@ def _refuse_files_of_others(folder: Path, beside: Sequence[str]) -> None:
             name, found = index.name, f"is not the index of a study ({error.faults[0].found})"
     else:
         found = "is not of a study"
-        name = next((one for one in names if os.path.lexists(folder / one)), "")
+        name = next((file for file in names if os.path.lexists(folder / file)), "")
         if not name:
             return
     allowed = "choose another `out`, or give `overwrite`"
@@ -200,12 +200,12 @@ def _refuse_files_of_others(folder: Path, beside: Sequence[str]) -> None:
 def _is_single(path: Path) -> bool:
     """Whether the numbers of a result file have 4 bytes (`Storage.single`)."""
     with h5py.File(path) as file:
-        return any(getattr(one, "dtype", None) == np.float32 for one in file.values())
+        return any(getattr(dataset, "dtype", None) == np.float32 for dataset in file.values())
 
 
-def _is_newer(one: Path, other: Path) -> bool:
+def _is_newer(path: Path, other: Path) -> bool:
     try:
-        return one.stat().st_mtime_ns >= other.stat().st_mtime_ns
+        return path.stat().st_mtime_ns >= other.stat().st_mtime_ns
     except OSError:
         return False
 
@@ -213,8 +213,8 @@ def _is_newer(one: Path, other: Path) -> bool:
 class State:
     """Which runs of a study are done, and which are to be computed.
 
-    `cases`: cases to compute; `keys`: keys of all points by their names; `found`: existing results
-    that are not in the journal; `to_be_analysed`: of cases whose run exists, but not their
+    `cases`: cases to compute; `keys`: keys of all points by their names; `existing`: results that
+    exist but are not in the journal; `to_be_analysed`: of cases whose run exists, but not their
     analyses, what the journal knows of it, perhaps nothing. Raises InputError: all faults of the
     cases to compute; without `resume` also results that would have to be replaced.
     """
@@ -225,32 +225,32 @@ class State:
         points: Sequence[Point],
         load: Load,
         spec: StudySpec,
-        known: Journal | None,
+        previous: Journal | None,
         execution: Execution,
     ) -> None:
         self._folder, self._points, self._spec = folder, points, spec
         anew = execution.overwrite
-        self._entries = dict(known.entries) if known and not anew else {}
+        self._entries = dict(previous.entries) if previous and not anew else {}
         self._files = {} if anew else _files(folder)
         self._damaged: dict[Path, str] = {}
         self._changed: list[str] = []
         self._reduced: list[str] = []
-        self._damaged_lines = known.damaged if known else 0
+        self._damaged_lines = previous.damaged if previous else 0
         self.keys = {point.name: point.key for point in points}
-        self.found: list[tuple[Point, Record]] = []
+        self.existing: list[tuple[Point, Record]] = []
         self.to_be_analysed: dict[str, Record] = {}
         waiting = [point for point in points if not self._is_done(point)]
         self._waiting = dict(zip(waiting, load(waiting), strict=True))
         faults = [fault for one in self._waiting.items() for fault in self._faults_of(*one)]
         if faults and not execution.resume:
             raise InputError(faults)
-        found = {point for point, _ in self.found}
+        found = {point for point, _ in self.existing}
         self.cases = [case for point, case in self._waiting.items() if point not in found]
         inputs = ((case.vehicle, case.track, case.settings) for case in self.cases)
         check_laws(law for each in inputs for one in each for law in (one.laws or {}).items())
         if not (execution.resume or execution.trying):
             runs = {point.name: point.run for point in waiting}
-            _check_settings([c for c in self.cases if c.file_name], runs, spec.combined)
+            _check_settings([c for c in self.cases if c.file_name], runs, spec.varied_keys)
 
     def _is_done(self, point: Point) -> bool:
         """Whether the journal has the result of these inputs, and its file has not changed."""
@@ -273,15 +273,15 @@ class State:
         try:
             result = open_result(path)
             if result.attributes.get("inputs_hash") == case.key:
-                known = self._known(case)
-                if self._lacks(case, result, known):
+                record = self._journal_record(case)
+                if self._lacks(case, result, record):
                     self._reduced.append(case.name)
                     found = "a result without all quantities or digits of this study"
                     return [argument_fault("out", str(path), found, CHANGED)]
                 if case.analyses or self._spec.quantities:  # takes time: done as a job like others
-                    self.to_be_analysed[case.name] = known
+                    self.to_be_analysed[case.name] = record
                 else:
-                    self.found.append((point, finished_record(case, result, None, known)))
+                    self.existing.append((point, finished_record(case, result, None, record)))
                 return []
         except InputError as error:
             self._damaged[path] = str(error.faults[0])
@@ -289,7 +289,7 @@ class State:
         self._changed.append(case.name)
         return [argument_fault("out", str(path), "a result of other inputs", CHANGED)]
 
-    def _known(self, case: Case) -> Record:
+    def _journal_record(self, case: Case) -> Record:
         """Return what the journal knows of a run whose file is there; empty: nothing."""
         entry = self._entries.get(case.name)
         if entry is None or not (entry.is_done and entry.is_of(self._files[case.file_name])):
@@ -297,28 +297,28 @@ class State:
         record = Records(self._folder / JOURNAL, [entry])[0]
         return record if record["inputs_hash"] == case.key else {}
 
-    def _lacks(self, case: Case, result: Result, known: Record) -> bool:
+    def _lacks(self, case: Case, result: Result, record: Record) -> bool:
         """Whether a file lacks what is to be kept, or what a summary needs that is not known.
 
         That is quantities, or digits.
         """
-        if not (self._spec.single and known) and _is_single(self._folder / case.file_name):
+        if not (self._spec.single and record) and _is_single(self._folder / case.file_name):
             return True
         outputs = case.settings.outputs
         recorded = {n for n in QUANTITIES if matches(n, outputs.quantities or ("*",))}
         recorded |= {q.name for q in extra_quantities(outputs, case.track)} - {"element_command"}
-        wanted = [*kept_quantities(self._spec.keep), *(() if known else OF_FACTS)]
-        return any(name not in result for name in recorded if matches(name, wanted))
+        required = [*kept_quantities(self._spec.keep), *(() if record else OF_FACTS)]
+        return any(name not in result for name in recorded if matches(name, required))
 
     def settle(self, journal: Journal) -> list[str]:
         """Record existing results, rename damaged files; return remarks for the user."""
         remarks = []
         if self._damaged_lines:
             remarks.append(f"{self._damaged_lines} damaged lines of {JOURNAL} are ignored")
-        for point, record in self.found:
+        for point, record in self.existing:
             journal.add(record, point.key, self._files[record["file"]])
         for path, words in self._damaged.items():
-            old = _moved_aside(path)
+            old = _move_aside(path)
             remarks.append(f"{words}: it is computed again; the old file is kept as {old.name}")
         gone = [case.name for case in self.cases if case.file_name not in self._files]
         lost = [name for name in gone if name in self._entries and self._entries[name].size]
@@ -333,8 +333,8 @@ class State:
         """Return the records of all runs, done or waiting, in the order of the combinations."""
         waiting = {point.name: case for point, case in self._waiting.items()}
         names = [point.name for point in self._points]
-        found = [journal.entries.get(name) or waiting_record(waiting[name]) for name in names]
-        return Records(journal.path, found)
+        entries = [journal.entries.get(name) or waiting_record(waiting[name]) for name in names]
+        return Records(journal.path, entries)
 
 
 def _check_settings(
@@ -349,28 +349,28 @@ def _check_settings(
     for case in cases:
         own = str(case.settings.outputs.own or "")
         if own or case.settings.step is not None:
-            key = case.labels.get("vehicle"), case.settings.scheme, own, case.settings.step or 0.0
+            key = (case.labels.get("vehicle"), case.settings.scheme, own, case.settings.step or 0.0)
             if key not in longest or case.speed > longest[key].speed:
                 longest[key] = case
     faults, stable = Faults(), set[tuple[object, ...]]()
-    for (*of, _), case in sorted(longest.items(), key=lambda one: -(one[1].settings.step or 0.0)):
-        if tuple(of) in stable:
+    for (*kind, _), case in sorted(longest.items(), key=lambda it: -(it[1].settings.step or 0.0)):
+        if tuple(kind) in stable:
             continue  # with a longer step
 
-        def told(fault: Fault, name: str = case.name) -> Fault:
+        def add_run_name(fault: Fault, name: str = case.name) -> Fault:
             return replace(of_settings(fault, runs[name], grid), found=f"{fault.found}, {name}")
 
         inputs = case.vehicle, case.track, case.settings
-        with faults.caught(told), suppress(ModelError):  # the outcome of the run
+        with faults.caught(add_run_name), suppress(ModelError):  # the outcome of the run
             if case.settings.outputs.own:
                 check_own_outputs(*inputs)
             if case.settings.step is not None:
                 check_step(*inputs, case.speed)
-            stable.add(tuple(of))
+            stable.add(tuple(kind))
     faults.check()
 
 
-def _moved_aside(path: Path) -> Path:
+def _move_aside(path: Path) -> Path:
     """Give a damaged file another name that is free, and return it."""
     endings = chain([""], (f"-{number}" for number in count(2)))
     names = (path.with_name(f"{path.name}.damaged{ending}") for ending in endings)

@@ -109,8 +109,8 @@ def of_settings(fault: Fault, run: RunSpec, grid: Collection[str] = ()) -> Fault
     if fault.file != "settings":
         return fault
     key = f"settings.{fault.key}"
-    given = (text.partition("=")[0].strip() for text in run.assignments)
-    if any(_leads_to(name, key) or name.startswith(f"{key}.") for name in given):
+    assigned = (text.partition("=")[0].strip() for text in run.assignments)
+    if any(_leads_to(name, key) or name.startswith(f"{key}.") for name in assigned):
         return as_written(replace(fault, file=OVERRIDE), grid, "settings")
     return fault if run.settings is None else replace(fault, file=str(run.settings))
 
@@ -154,12 +154,12 @@ class Loader:
 
     def _overrides(self, assignments: tuple[str, ...]) -> dict[str, Overrides]:
         """Return the assignments to vehicle, track and settings, each with the file's own keys."""
-        found: dict[str, Overrides] = dict.fromkeys(LOADERS, ())
+        overrides: dict[str, Overrides] = dict.fromkeys(LOADERS, ())
         for text in assignments:
             with self.faults.caught(lambda fault: as_written(fault, self._grid)):
                 for kind, some in split_overrides([text]).items():
-                    found[kind] += tuple(some)
-        return found
+                    overrides[kind] += tuple(some)
+        return overrides
 
     def first_speed(self, run: RunSpec) -> float | None:
         """Return the speed at the start of a run [m/s]; None if there is none."""
@@ -190,8 +190,8 @@ class Loader:
         self, vehicle: Vehicle, track: Track, settings: Settings, speed: float, run: RunSpec
     ) -> list[Fault]:
         """Return in what settings do not fit the vehicle, the track or an assessment of the run."""
-        found = Faults()
-        with found.caught():
+        faults = Faults()
+        with faults.caught():
             check_agreement(vehicle, track, settings, speed, short_name(run.vehicle))
         wheelsets = (w for group in groups(vehicle) for w in group.wheelsets.values())
         sides = ((w, side) for w in wheelsets for side in range(2) if self._contacts)
@@ -199,17 +199,17 @@ class Loader:
         pairs = ((w.profile[k], w.radius[k], w.back_to_back, track.rail[k], *of) for w, k in sides)
         for pair in dict.fromkeys(pairs):
             words = f"{short_name(run.vehicle)} on {short_name(run.track)}"
-            found += [replace(one, file=words) for one in self._misfits(*pair)]
+            faults += [replace(misfit, file=words) for misfit in self._misfits(*pair)]
         for name, analysis in self._analyses.items():
             if isinstance(analysis, AssessAnalysis):
                 from railsim.assessment.outputs import check_outputs
 
-                def told(fault: Fault, name: str = name) -> Fault:
+                def add_analysis(fault: Fault, name: str = name) -> Fault:
                     return replace(fault, found=f"{fault.found}, for analyses.{name}")
 
-                with found.caught(told):
+                with faults.caught(add_analysis):
                     check_outputs(vehicle, settings, speed, analysis.standard, coarse=True)
-        return [of_settings(fault, run, self._grid) for fault in found]
+        return [of_settings(fault, run, self._grid) for fault in faults]
 
 
 def _misfits(
@@ -217,12 +217,12 @@ def _misfits(
 ) -> list[Fault]:
     """Return why a wheelset cannot run in a track; nothing where a profile cannot be used."""
     try:
-        there = rail_curve(load_profile(rail, "rail"), gauge, inclination)
+        rail_line = rail_curve(load_profile(rail, "rail"), gauge, inclination)
         place = tape_circle_position(back_to_back)
-        own = wheel_curve(load_profile(wheel, "wheel"), radius, place, AS_IN_TABLES)
+        wheel_line = wheel_curve(load_profile(wheel, "wheel"), radius, place, AS_IN_TABLES)
     except InputError:
         return []  # told with the profile
-    return misfits(own, there, gauge, f"{wheel} on {rail}, gauge {1e3 * gauge:.1f} mm")
+    return misfits(wheel_line, rail_line, gauge, f"{wheel} on {rail}, gauge {1e3 * gauge:.1f} mm")
 
 
 def load_case(run: RunSpec) -> Case:

@@ -62,39 +62,39 @@ class Design:
 class Evaluation:
     """Evaluation of designs by a study, as called by a search.
 
-    `rows`: values of the variables of all designs, as written; `asked`: for each point that the
+    `rows`: values of the variables of all designs, as written; `requested`: for each point that the
     search has requested, the number of its row.
     """
 
     def __init__(
-        self, definition: Study, wanted: Optimise, folder: Path, execution: Execution
+        self, definition: Study, problem: Optimise, folder: Path, execution: Execution
     ) -> None:
-        self.definition, self.wanted, self.folder = definition, wanted, folder
-        self.variables = list(wanted.variables.items())  # paths and bounds
+        self.definition, self.problem, self.folder = definition, problem, folder
+        self.variables = list(problem.variables.items())  # paths and bounds
         self.rows: list[tuple[str, ...]] = []
-        self.asked: list[int] = []
+        self.requested: list[int] = []
         self.computed = 0
         self.designs: tuple[Design, ...] = ()
-        self._margins = np.zeros((0, len(wanted.constraints)))
-        self._scales = np.ones(len(wanted.constraints))
+        self._margins = np.zeros((0, len(problem.constraints)))
+        self._scales = np.ones(len(problem.constraints))
         self._spec = StudySpec.of_file(definition, keep="summary")
         self._progress = execution.progress or (lambda _: None)
         self._execution = replace(execution, resume=not execution.overwrite)
 
     def __call__(self, points: Floats) -> Values:
         """Compute designs, and return the values of all designs requested so far."""
-        known = {row: number for number, row in enumerate(self.rows)}
+        row_numbers = {row: number for number, row in enumerate(self.rows)}
         for point in points:
             shares = zip(point.tolist(), self.variables, strict=True)
-            row = tuple(_written(variable, share) for share, (_, variable) in shares)
-            if row not in known:
-                known[row] = len(self.rows)
+            row = tuple(_written_value(variable, share) for share, (_, variable) in shares)
+            if row not in row_numbers:
+                row_numbers[row] = len(self.rows)
                 self.rows.append(row)
-            self.asked.append(known[row])
-        before, number = len(self.designs), self.wanted.evaluations
+            self.requested.append(row_numbers[row])
+        before, number = len(self.designs), self.problem.evaluations
         self._study(lambda share: self._progress(min(1.0, (before + share * len(points)) / number)))
-        values = signs_of(self.wanted) * np.array([design.objectives for design in self.designs])
-        return Values(values[self.asked], self._margins[self.asked])
+        values = signs_of(self.problem) * np.array([design.objectives for design in self.designs])
+        return Values(values[self.requested], self._margins[self.requested])
 
     def _study(self, progress: Progress) -> None:
         """Carry out the study of all designs, and gather the runs of each."""
@@ -108,8 +108,8 @@ class Evaluation:
         self.computed += outcome.computed
         complete = (record for record in outcome.records if record["status"] == "complete")
         rows = [(record["labels"], summary_row(record)) for record in complete]
-        _check_quantities(self.wanted, rows)
-        for text in () if self.designs else _sign_remarks(self.wanted, rows):
+        _check_quantities(self.problem, rows)
+        for text in () if self.designs else _sign_remarks(self.problem, rows):
             (self._execution.on_remark or _LOG.warning)(text)
         runs: dict[tuple[str, ...], list[Record]] = {row: [] for row in self.rows}
         for record in outcome.records:
@@ -117,28 +117,28 @@ class Evaluation:
         designs, margins = [], []
         for number, row in enumerate(self.rows, start=1):
             rows = [(record["labels"], summary_row(record)) for record in runs[row]]
-            bad = [record for record in runs[row] if record["status"] != "complete"]
-            objectives = tuple(_objective(one, rows) for one in self.wanted.objectives)
-            worst = [_constraint(one, rows) for one in self.wanted.constraints]
+            incomplete = [record for record in runs[row] if record["status"] != "complete"]
+            objectives = tuple(_objective_value(one, rows) for one in self.problem.objectives)
+            worst = [_constraint_value(one, rows) for one in self.problem.constraints]
             excess = tuple(margin for _, margin in worst)
-            if bad:
+            if incomplete:
                 objectives, excess = (math.nan,) * len(objectives), (math.nan,) * len(excess)
-            fine = not any(map(math.isnan, objectives)) and all(one <= 0.0 for one in excess)
-            values = dict(zip(self.wanted.variables, map(float, row), strict=True))
-            reason = str(bad[0]["status_reason"]) if bad else ""
-            limits = (math.nan,) * len(worst) if bad else tuple(value for value, _ in worst)
-            designs.append(Design(number, values, objectives, limits, fine, reason))
+            feasible = not any(map(math.isnan, objectives)) and all(one <= 0.0 for one in excess)
+            values = dict(zip(self.problem.variables, map(float, row), strict=True))
+            reason = str(incomplete[0]["status_reason"]) if incomplete else ""
+            limits = (math.nan,) * len(worst) if incomplete else tuple(value for value, _ in worst)
+            designs.append(Design(number, values, objectives, limits, feasible, reason))
             margins.append(excess)
         if not self.designs:
-            columns = zip(self.wanted.constraints, zip(*margins, strict=True), strict=True)
+            columns = zip(self.problem.constraints, zip(*margins, strict=True), strict=True)
             self._scales = np.array([_scale(one, column) for one, column in columns])
         self._margins = np.array(margins, dtype=float).reshape(len(designs), -1) / self._scales
-        most = self._margins.max(axis=1, initial=-math.inf).tolist()
-        pairs = zip(designs, most, strict=True)
+        largest = self._margins.max(axis=1, initial=-math.inf).tolist()
+        pairs = zip(designs, largest, strict=True)
         self.designs = tuple(replace(design, excess=excess) for design, excess in pairs)
 
 
-def _written(variable: Variable, share: float) -> str:
+def _written_value(variable: Variable, share: float) -> str:
     """Return the value at a share of a variable's range as text, within the range.
 
     >>> _written(Variable(low=1e3, high=1e5, scale="log"), 0.5)
@@ -162,127 +162,126 @@ def share_of(variable: Variable, value: float) -> float:
     return (value - variable.low) / (variable.high - variable.low)
 
 
-def signs_of(wanted: Optimise) -> Floats:
+def signs_of(problem: Optimise) -> Floats:
     """Return 1 for each objective to minimise, -1 for each to maximise."""
-    return np.array([1.0 if one.goal == "minimise" else -1.0 for one in wanted.objectives])
+    return np.array([1.0 if goal.goal == "minimise" else -1.0 for goal in problem.objectives])
 
 
 Rows = Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]
 
 
-def _values(one: Value, rows: Rows) -> list[float]:
+def _run_values(value: Value, rows: Rows) -> list[float]:
     """Return a quantity of the selected runs, NaN where a run lacks it."""
-    found = []
-    for labels, cells in rows:
-        if not selects(one, labels):
-            continue
-        cell = cells.get(one.quantity)
-        value = float(cell) if isinstance(cell, int | float) else math.nan
-        found.append(abs(value) if one.magnitude else value)
-    return found
+    numbers = []
+    for cells in (cells for labels, cells in rows if selects(value, labels)):
+        cell = cells.get(value.quantity)
+        number = float(cell) if isinstance(cell, int | float) else math.nan
+        numbers.append(abs(number) if value.magnitude else number)
+    return numbers
 
 
-def _objective(one: Objective, rows: Rows) -> float:
-    values = _values(one, rows)
+def _objective_value(objective: Objective, rows: Rows) -> float:
+    values = _run_values(objective, rows)
     if not values or any(map(math.isnan, values)):
         return math.nan
-    if one.over == "mean":
+    if objective.over == "mean":
         return math.fsum(values) / len(values)
-    return max(values) if one.goal == "minimise" else min(values)
+    return max(values) if objective.goal == "minimise" else min(values)
 
 
-def _constraint(one: Constraint, rows: Rows) -> tuple[float, float]:
+def _constraint_value(constraint: Constraint, rows: Rows) -> tuple[float, float]:
     """Return the worst value, and its relative excess over the limit, negative within it.
 
     Over a limit of 0 that over the other limit; if there is none the excess itself, see `_scale`.
     """
-    found = (math.nan, math.nan)
-    other = abs(one.low or 0.0) + abs(one.high or 0.0) or 1.0
-    for value in _values(one, rows):
+    worst = (math.nan, math.nan)
+    other = abs(constraint.low or 0.0) + abs(constraint.high or 0.0) or 1.0
+    for value in _run_values(constraint, rows):
         if math.isnan(value):
             return math.nan, math.nan
-        for limit, sign in ((one.high, 1.0), (one.low, -1.0)):
+        for limit, sign in ((constraint.high, 1.0), (constraint.low, -1.0)):
             if limit is None:
                 continue
             beyond = sign * (value - limit) / (abs(limit) or other)
-            if not beyond <= found[1]:
-                found = value, beyond
-    return found
+            if not beyond <= worst[1]:
+                worst = value, beyond
+    return worst
 
 
-def _scale(one: Constraint, excess: Sequence[float]) -> float:
+def _scale(constraint: Constraint, excess: Sequence[float]) -> float:
     """Return what the excess over a limit of 0 counts by: the largest of the first designs.
 
     A search adds up the excess of all constraints, whatever their units.
     """
-    if one.low or one.high:
+    if constraint.low or constraint.high:
         return 1.0
     return max((abs(x) for x in excess if not math.isnan(x)), default=0.0) or 1.0
 
 
-def _sign_remarks(wanted: Optimise, rows: Rows) -> Iterator[str]:
+def _sign_remarks(problem: Optimise, rows: Rows) -> Iterator[str]:
     """Yield what counts with its sign although its column is one of largest magnitudes.
 
     The sign is a direction, which turns with the curve: a large negative value is not a small one.
     """
-    for one in wanted.values.values():
-        both = isinstance(one, Constraint) and None not in (one.low, one.high)
-        if both or one.magnitude or not _MAGNITUDE.fullmatch(one.quantity):
+    for value in problem.values.values():
+        both = isinstance(value, Constraint) and None not in (value.low, value.high)
+        if both or value.magnitude or not _MAGNITUDE.fullmatch(value.quantity):
             continue
-        if any(value < 0.0 for value in _values(one, rows)):
+        if any(number < 0.0 for number in _run_values(value, rows)):
             yield (
-                f"{name_of(one)} has negative values: the sign of the largest magnitude is its "
+                f"{name_of(value)} has negative values: the sign of the largest magnitude is its "
                 "direction; with `magnitude = true` its size counts"
             )
 
 
-def _check_quantities(wanted: Optimise, rows: Rows) -> None:
+def _check_quantities(problem: Optimise, rows: Rows) -> None:
     """Refuse a quantity that no complete run has."""
     if not rows:
         return
-    known = {name for _, cells in rows for name, v in cells.items() if isinstance(v, int | float)}
+    names = {name for _, cells in rows for name, v in cells.items() if isinstance(v, int | float)}
     Faults(
-        Fault(INPUTS, f"{key}.quantity", f"no run has '{one}'", nearest(one, known))
-        for key, one in ((key, value.quantity) for key, value in wanted.values.items())
-        if one not in known
+        Fault(INPUTS, f"{key}.quantity", f"no run has '{quantity}'", nearest(quantity, names))
+        for key, quantity in ((key, value.quantity) for key, value in problem.values.items())
+        if quantity not in names
     ).check()
 
 
-def name_of(one: Value) -> str:
+def name_of(value: Value) -> str:
     """Return the name of a value: its quantity, with the selected runs."""
-    where = ", ".join(f"{key}={value}" for key, value in one.where.items())
-    name = f"|{one.quantity}|" if one.magnitude else one.quantity
+    where = ", ".join(f"{key}={label}" for key, label in value.where.items())
+    name = f"|{value.quantity}|" if value.magnitude else value.quantity
     return f"{name} at {where}" if where else name
 
 
-def with_unit(one: Value) -> str:
+def with_unit(value: Value) -> str:
     """Return the name of a value with its unit."""
-    unit = unit_of(one.quantity)
-    return f"{name_of(one)} ({unit})" if unit else name_of(one)
+    unit = unit_of(value.quantity)
+    return f"{name_of(value)} ({unit})" if unit else name_of(value)
 
 
 def values_by_name(
-    wanted: Optimise, designs: Sequence[Design], named: Callable[[Value], str] = with_unit
+    problem: Optimise, designs: Sequence[Design], label: Callable[[Value], str] = with_unit
 ) -> dict[str, list[float]]:
-    """Return objectives and constraints of designs by name, with unit unless `named` otherwise.
+    """Return objectives and constraints of designs by name, with unit unless `label` otherwise.
 
     A quantity that is several of them stands once, and again where its values differ, as the mean
     over the runs, the smallest and the largest of them do.
     """
-    found: dict[str, list[float]] = {}
-    for number, one in enumerate(wanted.values.values()):
-        name, values = named(one), [design.values[number] for design in designs]
-        if not np.array_equal(found.get(name, values), values, equal_nan=True):
-            name = f"{name}, {of_the_runs(one)}"
-        found[name] = values
-    return found
+    columns: dict[str, list[float]] = {}
+    for number, value in enumerate(problem.values.values()):
+        name, values = label(value), [design.values[number] for design in designs]
+        if not np.array_equal(columns.get(name, values), values, equal_nan=True):
+            name = f"{name}, {statistic_over_runs(value)}"
+        columns[name] = values
+    return columns
 
 
-def of_the_runs(one: Value) -> str:
+def statistic_over_runs(value: Value) -> str:
     """Return which value over the runs of a design an objective or a constraint takes."""
-    if isinstance(one, Objective):
-        return "mean" if one.over == "mean" else "largest" if one.goal == "minimise" else "smallest"
-    assert isinstance(one, Constraint)
-    if one.low is not None and one.high is not None:
+    if isinstance(value, Objective):
+        worst = "largest" if value.goal == "minimise" else "smallest"
+        return "mean" if value.over == "mean" else worst
+    assert isinstance(value, Constraint)
+    if value.low is not None and value.high is not None:
         return "worst of its limits"
-    return "largest" if one.low is None else "smallest"
+    return "largest" if value.low is None else "smallest"

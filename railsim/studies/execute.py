@@ -32,7 +32,7 @@ from railsim.result.hdf5 import PLAIN, Storage, write
 from railsim.result.sinks import EVERYTHING, matches
 from railsim.simulation import simulate
 from railsim.simulation.first_start import compile_time_loop, is_compiled
-from railsim.studies.analyses import analysed
+from railsim.studies.analyses import numbers_and_remarks
 from railsim.studies.case import Case, run_case
 from railsim.studies.records import Record
 from railsim.studies.spec import Progress
@@ -72,7 +72,7 @@ def perform(job: Job, progress: Progress | None = None) -> Record:
     """Carry out a job and return its record, whether it succeeds or fails."""
     case = job.case
     if not case.file_name:
-        return _analysed(job)
+        return _analysis_record(job)
     if job.known is not None:
         with suppress(RailsimError):  # its file lacks required quantities: it is run again
             return finished_record(case, open_result(job.path), job.function, job.known)
@@ -88,16 +88,16 @@ def perform(job: Job, progress: Progress | None = None) -> Record:
             from railsim.plot.style import save
 
             save(histories(result), job.picture, overwrite=True)
-        return {**finished_record(case, result, job.function), "file": _reduced(job, result)}
+        return {**finished_record(case, result, job.function), "file": _reduce_file(job, result)}
     except Exception as error:
         return failed_record(case, error)
 
 
-def _analysed(job: Job) -> Record:
+def _analysis_record(job: Job) -> Record:
     """Return the record of a job without a run in the time domain."""
     begin = time.process_time()
     try:
-        quantities, said = analysed(job.case, None)
+        quantities, remarks = numbers_and_remarks(job.case, None)
     except ModelError as error:  # no solution: a result too, not computed again
         facts: Record = {"status": "stopped", "status_reason": str(error)}
     except Exception as error:
@@ -105,18 +105,18 @@ def _analysed(job: Job) -> Record:
     else:
         cpu_time = time.process_time() - begin
         facts = {"status": "complete", "cpu_time": cpu_time, "quantities": quantities}
-        facts["remarks"] = said
+        facts["remarks"] = remarks
     return waiting_record(job.case) | facts
 
 
-def _reduced(job: Job, result: Result) -> str:
+def _reduce_file(job: Job, result: Result) -> str:
     """Reduce a result file to what is kept; return its name, empty without a file."""
     if not job.keep:
         job.path.unlink(missing_ok=True)  # kept by an earlier run
         return ""
     if not job.whole:
-        wanted = (*job.keep, *ALWAYS_KEPT)
-        names = [name for name in result if matches(name, wanted)]
+        kept = (*job.keep, *ALWAYS_KEPT)
+        names = [name for name in result if matches(name, kept)]
         write(result, job.path, overwrite=True, names=names, storage=job.storage)
     return job.path.name
 
@@ -248,7 +248,7 @@ def run_briefly() -> None:
 def compile_on_cluster(client: Any, remark: Callable[[str], None]) -> None:
     """Have one worker of each machine of a dask cluster compile, before the others need it."""
     ready = client.run(is_compiled, on_error="ignore")  # by the addresses of the workers
-    first = {urlsplit(address).hostname: address for address, known in ready.items() if not known}
+    first = {urlsplit(address).hostname: address for address, done in ready.items() if not done}
     if first:
         remark(f"machines of the cluster that compile first, once, about a minute: {len(first)}")
         options = {"allow_other_workers": True, "pure": False}  # where one dies
@@ -266,12 +266,12 @@ def on_cluster(jobs: Sequence[Job], client: Any, progress: Progress) -> Iterator
     from distributed import as_completed
 
     with client, _marks({job.path.parent for job in jobs}) as mark:
-        futures = client.map(perform_there, list(jobs), mark=mark, pure=False)
+        futures = client.map(perform_remotely, list(jobs), mark=mark, pure=False)
         job_of = {future.key: job for future, job in zip(futures, jobs, strict=True)}
         waiting = as_completed(futures)
         del futures
         for number, future in enumerate(waiting):
-            yield _taken(future, job_of[future.key])
+            yield _receive(future, job_of[future.key])
             future.release()  # its files are no longer needed
             progress((number + 1) / len(jobs))
 
@@ -289,18 +289,18 @@ def _marks(folders: set[Path]) -> Iterator[str]:
             (folder / mark).unlink(missing_ok=True)
 
 
-def perform_there(job: Job, mark: str) -> tuple[Record, dict[str, bytes]]:
+def perform_remotely(job: Job, mark: str) -> tuple[Record, dict[str, bytes]]:
     """Carry out a job, perhaps without access to the folder; then the files it wrote come too."""
     if (job.path.parent / mark).is_file():
         return perform(job), {}
     with tempfile.TemporaryDirectory(prefix="railsim-") as folder:
-        there = Path(folder)
-        picture = job.picture and there / job.picture.name
-        here = replace(job, path=there / job.path.name, picture=picture)
-        return perform(here), {path.name: path.read_bytes() for path in there.iterdir()}
+        scratch = Path(folder)
+        picture = job.picture and scratch / job.picture.name
+        local = replace(job, path=scratch / job.path.name, picture=picture)
+        return perform(local), {path.name: path.read_bytes() for path in scratch.iterdir()}
 
 
-def _taken(future: Any, job: Job) -> Record:
+def _receive(future: Any, job: Job) -> Record:
     try:
         record: Record
         record, files = future.result()
@@ -314,10 +314,10 @@ def _taken(future: Any, job: Job) -> Record:
 _shared: Any = None
 
 
-def _begin(fractions: Any, holders: Any, stop: Any, handled: bool) -> None:
+def _begin(fractions: Any, holders: Any, stop: Any, without_log: bool) -> None:
     global _shared
     _shared = fractions, holders, stop
-    if handled:  # remarks on runs are in their records; here nobody else would hold them back
+    if without_log:  # remarks on runs are in their records; here nobody else would hold them back
         logging.getLogger("railsim").addHandler(logging.NullHandler())
     begin_worker(partial(_stop, stop))
 

@@ -33,7 +33,7 @@ class Gathered:
         return {name: open_run(self.paths[name]) for name in names if name in self.paths}
 
 
-def opened(paths: Sequence[Path]) -> dict[str, Result]:
+def open_results(paths: Sequence[Path]) -> dict[str, Result]:
     """Open results under the shortest names that tell them apart.
 
     Raises InputError: everything that cannot be read, or is given twice.
@@ -74,7 +74,7 @@ def gather(files: Sequence[str]) -> Gathered:
 
     Raises InputError: everything that cannot be read.
     """
-    found, faults = Gathered(), Faults()
+    gathered, faults = Gathered(), Faults()
     batches: list[tuple[Path, list[Record]]] = []
     for file in files:
         path = folder_of(file)
@@ -83,7 +83,7 @@ def gather(files: Sequence[str]) -> Gathered:
             if not records:
                 allowed = "the folder of a study, or one with .h5 files"
                 faults.append(Fault(file, "", "no results in this folder", allowed))
-            found.inputs = inputs if len(files) == 1 else {}
+            gathered.inputs = inputs if len(files) == 1 else {}
             batches.append((path if os.path.isdir(path) else path.parent, records))
     runs = [(folder, record["name"]) for folder, records in batches for record in records]
     places = Counter((folder / name).resolve() for folder, name in runs)
@@ -96,8 +96,8 @@ def gather(files: Sequence[str]) -> Gathered:
     for folder, records in batches:
         before = folder.resolve().name
         before = before if folders[before] == 1 else str(folder)
-        _add(found, records, folder, {name: f"{before}/{name}" for name in alike})
-    return found
+        _add(gathered, records, folder, {name: f"{before}/{name}" for name in alike})
+    return gathered
 
 
 def described_runs(file: str) -> Description:
@@ -115,21 +115,21 @@ def described_runs(file: str) -> Description:
 
 
 def _add(
-    found: Gathered, records: Sequence[Record], folder: Path, named: Mapping[str, str]
+    gathered: Gathered, records: Sequence[Record], folder: Path, new_names: Mapping[str, str]
 ) -> None:
-    """Add records; `named`: names of those that would not be told apart from others."""
+    """Add records; `new_names`: names of those that would not be told apart from others."""
     missing = 0
     for record in records:
-        name = named.get(record["name"], record["name"])
-        found.records.append({**record, "name": name})
+        name = new_names.get(record["name"], record["name"])
+        gathered.records.append({**record, "name": name})
         if record["status"] in ("failed", "waiting"):
             continue
         if record.get("file") and (folder / record["file"]).is_file():
-            found.paths[name] = folder / record["file"]
+            gathered.paths[name] = folder / record["file"]
         elif "peaks" in record:  # an analysis alone has no file
             missing += 1
     if missing:
-        found.remarks.append(
+        gathered.remarks.append(
             f"{missing} of {len(records)} runs in {folder} have no result file "
             "(`--keep summary`, or removed): only their summary can be shown."
         )

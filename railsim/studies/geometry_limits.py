@@ -76,8 +76,8 @@ class RecordedGeometry:
         edges[-1] = last
         cells = first + CELL * np.arange(len(exceeded))
         for begin, end in pairwise(edges.tolist()):
-            there = self.rails[:, (self.s >= begin) & (self.s < end)]
-            deviations, peaks = there.std(axis=1), np.abs(there).max(axis=1)
+            shown_cells = self.rails[:, (self.s >= begin) & (self.s < end)]
+            deviations, peaks = shown_cells.std(axis=1), np.abs(shown_cells).max(axis=1)
             values = [max(deviations[1], deviations[3]), max(deviations[0], deviations[2]),
                       max(peaks[1], peaks[3]), max(peaks[0], peaks[2])]  # fmt: skip
             by_geometry = any(v > limit for v, limit in zip(values, limits, strict=True))

@@ -19,7 +19,7 @@ from typing import Any, BinaryIO, NamedTuple, overload
 
 from railsim.errors import argument_error, input_error
 from railsim.files.access import locked
-from railsim.studies.records import Record, json_bytes, parsed
+from railsim.studies.records import Record, json_bytes, parse_json
 
 JOURNAL = "study.journal"
 FORMAT = "railsim-study-journal/1"
@@ -100,9 +100,9 @@ class Journal(AbstractContextManager["Journal"]):
             if line[:9] != b"%08x\t" % crc or not line.endswith(b"\n"):
                 raise ValueError
             end = line.index(b"\t", 9)
-            facts = parsed(line[9:end])
+            facts = parse_json(line[9:end])
             if "format" in facts:
-                self.inputs = parsed(line[end + 1 :]) if facts["format"] == FORMAT else None
+                self.inputs = parse_json(line[end + 1 :]) if facts["format"] == FORMAT else None
                 return
             entry = Entry(**facts, offset=offset + end + 1, length=len(line) - end - 2)
             self.entries[entry.name] = entry
@@ -180,10 +180,10 @@ class Records(Sequence[Record]):
     def __iter__(self) -> Iterator[Record]:
         return (record for record, _ in self._read(self._entries))
 
-    def where(self, chosen: Callable[[str], bool]) -> tuple[Record, ...]:
+    def of_status(self, accepts: Callable[[str], bool]) -> tuple[Record, ...]:
         """Return the records of runs of a chosen status."""
         each = ((e.status if isinstance(e, Entry) else e["status"], e) for e in self._entries)
-        found = [entry for status, entry in each if chosen(status)]
+        found = [entry for status, entry in each if accepts(status)]
         return tuple(record for record, _ in self._read(found))
 
     def with_texts(self) -> Iterator[tuple[Record, bytes]]:
@@ -204,7 +204,7 @@ class Records(Sequence[Record]):
 
     def _record(self, entry: Entry, text: bytes) -> Record:
         try:
-            record: Record = parsed(text)
+            record: Record = parse_json(text)
             if not record.keys() >= RECORD or not isinstance(record["labels"], dict):
                 raise ValueError("it lacks " + ", ".join(sorted(RECORD - record.keys())))
         except (ValueError, AttributeError) as error:

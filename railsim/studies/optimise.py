@@ -33,16 +33,16 @@ from railsim.studies.designs import (
     Design,
     Evaluation,
     name_of,
-    of_the_runs,
     share_of,
     signs_of,
+    statistic_over_runs,
     values_by_name,
     with_unit,
 )
 from railsim.studies.plan import ROUGH_DURATION, check_number, check_study, faults_of_file
 from railsim.studies.search import METHODS, Task, knee, non_dominated
 from railsim.studies.sensitivity import Sensitivity, sensitivities
-from railsim.studies.spec import Execution, Progress, checked
+from railsim.studies.spec import Execution, Progress, validated
 from railsim.studies.summary import unit_of
 from railsim.table import Column, Table
 from railsim.text import plain
@@ -104,13 +104,13 @@ class Optimisation:
         if self.chosen is None:
             known = [design for design in self.designs if math.isfinite(design.excess)]
             nearest = min(known, key=lambda design: design.excess)
-            words = self._none("keeps all constraints")
-            return [words, "", self._shown([nearest], nearest, "nearest")]
+            words = self._no_design("keeps all constraints")
+            return [words, "", self._excerpt([nearest], nearest, "nearest")]
         shown = [*self.front[:: max(1, math.ceil(len(self.front) / MOST_ROWS))]]
         if self.chosen not in shown:
             shown.append(self.chosen)
         number = f"front of {len(self.front)} in {len(self.designs)} designs"
-        parts: list[str | Table] = [number, "", self._shown(shown, self.chosen, "chosen"), ""]
+        parts: list[str | Table] = [number, "", self._excerpt(shown, self.chosen, "chosen"), ""]
         parts += [f"remark: {self.chosen.remark}"] * bool(self.chosen.remark)
         parts += [f"active (within {NEAR_BOUND:.0%}): {words}" for words in self.active]
         unknown = sum(map(math.isnan, (sum(design.values) for design in self.designs)))
@@ -124,18 +124,18 @@ class Optimisation:
         """Return the sentence that no design has values, with a reason; empty if one has."""
         if any(not math.isnan(sum(design.values)) for design in self.designs):
             return ""
-        return self._none("has values")
+        return self._no_design("has values")
 
-    def _none(self, what: str) -> str:
+    def _no_design(self, predicate: str) -> str:
         reasons = sorted({design.reason for design in self.designs if design.reason})
-        return ": ".join([f"none of {len(self.designs)} designs {what}", *reasons[:1]])
+        return ": ".join([f"none of {len(self.designs)} designs {predicate}", *reasons[:1]])
 
-    def _shown(self, shown: Sequence[Design], marked: Design, mark: str) -> Table:
+    def _excerpt(self, designs: Sequence[Design], marked: Design, mark: str) -> Table:
         """Some rows of the table, `mark` beside one of them."""
-        designs, ends = self.table(), 3  # feasible, front and reason are for spreadsheets
-        rows = [["", *designs.rows[design.number - 1][:-ends]] for design in shown]
-        rows[shown.index(marked)][0] = mark
-        return Table(["", *designs.columns[:-ends]], rows)
+        table, ends = self.table(), 3  # feasible, front and reason are for spreadsheets
+        rows = [["", *table.rows[design.number - 1][:-ends]] for design in designs]
+        rows[designs.index(marked)][0] = mark
+        return Table(["", *table.columns[:-ends]], rows)
 
     def record(self) -> dict[str, Any]:
         """Return everything as plain data [SI]."""
@@ -200,10 +200,10 @@ def optimise(
         raise input_error(str(file), "missing", "needed: variables and objectives", key="optimise")
     changes = {"method": method, "evaluations": evaluations, "seed": seed}
     replaced = {name: value for name, value in changes.items() if value is not None}
-    wanted = checked(Optimise, definition.optimise.model_dump() | replaced, "optimise")
-    if choose is not None and not 1 <= choose <= wanted.evaluations:
-        raise argument_error("choose", f"design {choose}", f"1 to {wanted.evaluations}")
-    runs = wanted.evaluations * definition.runs
+    problem = validated(Optimise, definition.optimise.model_dump() | replaced, "optimise")
+    if choose is not None and not 1 <= choose <= problem.evaluations:
+        raise argument_error("choose", f"design {choose}", f"1 to {problem.evaluations}")
+    runs = problem.evaluations * definition.runs
     check_number(runs, workers or available_cores(), lambda: ROUGH_DURATION)
     with nullcontext() if isinstance(file, Study) else faults_of_file(str(file)):
         check_study(definition)
@@ -213,18 +213,18 @@ def optimise(
         overwrite=overwrite,
         progress=progress,
         on_remark=on_remark,
-        beside=BESIDE,
+        further_files=BESIDE,
         trying=True,
     )
     folder = Path(out)
     check_folder(folder, (*FILES, *BESIDE, INPUTS), overwrite=True)
     _check_folder(folder, definition, resume=resume, overwrite=overwrite)
-    evaluation = Evaluation(definition, wanted, folder, execution)
-    sizes = len(wanted.variables), len(wanted.objectives), len(wanted.constraints)
-    number = wanted.evaluations
-    task = Task(evaluation, *sizes, number, min(wanted.batch, number), wanted.seed)
-    METHODS[wanted.method](task)
-    return _concluded(evaluation, choose)
+    evaluation = Evaluation(definition, problem, folder, execution)
+    sizes = len(problem.variables), len(problem.objectives), len(problem.constraints)
+    number = problem.evaluations
+    task = Task(evaluation, *sizes, number, min(problem.batch, number), problem.seed)
+    METHODS[problem.method](task)
+    return _conclude(evaluation, choose)
 
 
 def _check_folder(folder: Path, definition: Study, *, resume: bool, overwrite: bool) -> None:
@@ -244,10 +244,10 @@ def _check_folder(folder: Path, definition: Study, *, resume: bool, overwrite: b
     write_text(path, text)
 
 
-def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
+def _conclude(evaluation: Evaluation, choose: int | None) -> Optimisation:
     """Determine front, chosen design and sensitivities, and write the files."""
-    wanted, designs = evaluation.wanted, evaluation.designs
-    signs = signs_of(wanted)
+    problem, designs = evaluation.problem, evaluation.designs
+    signs = signs_of(problem)
     feasible = [design for design in designs if design.feasible]
     front: list[Design] = []
     chosen = None
@@ -261,79 +261,79 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
         if not 1 <= choose <= len(designs):
             raise argument_error("choose", f"design {choose}", f"1 to {len(designs)}")
         chosen = designs[choose - 1]
-    about = evaluation.folder, wanted, designs, tuple(front), chosen
+    about = evaluation.folder, problem, designs, tuple(front), chosen
     definition = evaluation.definition
     overrides = split_overrides(definition.assignments)["vehicle"]
     vehicle = load_vehicle(definition.vehicles[0], overrides)
-    units = {path: unit_of_key(vehicle, path.removeprefix("vehicle.")) for path in wanted.variables}
-    found = Optimisation(
+    units = {key: unit_of_key(vehicle, key.removeprefix("vehicle.")) for key in problem.variables}
+    optimisation = Optimisation(
         *about,
-        _active(wanted, chosen, designs, units) if chosen else (),
+        _active(problem, chosen, designs, units) if chosen else (),
         tuple(_sensitivities(evaluation, chosen)) if chosen else (),
         tuple(export_vehicles(evaluation, chosen)) if chosen else (),
         evaluation.computed,
         units,
     )
-    _write(found, definition.name)
-    return found
+    _write(optimisation, definition.name)
+    return optimisation
 
 
 def _sensitivities(evaluation: Evaluation, chosen: Design) -> Sequence[Sensitivity]:
-    wanted = evaluation.wanted
-    variables = wanted.variables.items()
+    problem = evaluation.problem
+    variables = problem.variables.items()
     shares = np.array(
         [[share_of(v, d.variables[path]) for path, v in variables] for d in evaluation.designs]
     )  # designs as points of the unit cube
-    values = values_by_name(wanted, evaluation.designs, name_of)
+    values = values_by_name(problem, evaluation.designs, name_of)
     columns, middle = np.transpose(list(values.values())), shares[chosen.number - 1]
-    return sensitivities(shares, columns, middle, list(wanted.variables), list(values))
+    return sensitivities(shares, columns, middle, list(problem.variables), list(values))
 
 
 def _active(
-    wanted: Optimise, chosen: Design, designs: Sequence[Design], units: Mapping[str, str]
+    problem: Optimise, chosen: Design, designs: Sequence[Design], units: Mapping[str, str]
 ) -> tuple[str, ...]:
     """Return the bounds and limits that a design reaches, limits of 0 by the range of `designs`."""
-    found = []
-    for path, variable in wanted.variables.items():
+    reached = []
+    for path, variable in problem.variables.items():
         share = share_of(variable, chosen.variables[path])
         ends = ("lower", share, variable.low), ("upper", 1.0 - share, variable.high)
-        for words, distance, bound in ends:
+        for side, distance, bound in ends:
             if distance <= NEAR_BOUND:
-                found.append(f"{path} at its {words} bound, {bound:.12g} {units[path]}".rstrip())
-    number = len(wanted.constraints)
+                reached.append(f"{path} at its {side} bound, {bound:.12g} {units[path]}".rstrip())
+    number = len(problem.constraints)
     known = np.array([one.constraints for one in designs if not math.isnan(sum(one.constraints))])
     ranges = np.ptp(known, axis=0) if len(known) else np.zeros(number)
-    for one, value, span in zip(wanted.constraints, chosen.constraints, ranges, strict=True):
-        for words, limit in (("lower", one.low), ("upper", one.high)):
+    for one, value, span in zip(problem.constraints, chosen.constraints, ranges, strict=True):
+        for side, limit in (("lower", one.low), ("upper", one.high)):
             if limit is not None and abs(value - limit) <= NEAR_BOUND * (abs(limit) or span):
                 unit = unit_of(one.quantity)
-                found.append(f"{name_of(one)} at its {words} limit, {limit:.12g} {unit}".rstrip())
-    return tuple(found)
+                reached.append(f"{name_of(one)} at its {side} limit, {limit:.12g} {unit}".rstrip())
+    return tuple(reached)
 
 
-def _write(found: Optimisation, name: str) -> None:
+def _write(result: Optimisation, name: str) -> None:
     from railsim.plot.study import front_figure, say_above, sensitivity_figure
     from railsim.plot.style import save
 
-    text = json.dumps(plain(found.record()), indent=1, allow_nan=False)
-    write_text(found.folder / "optimise.json", text + "\n")
-    write_text(found.folder / "designs.csv", found.table().csv())
-    objectives = found.definition.objectives
+    text = json.dumps(plain(result.record()), indent=1, allow_nan=False)
+    write_text(result.folder / "optimise.json", text + "\n")
+    write_text(result.folder / "designs.csv", result.table().csv())
+    objectives = result.definition.objectives
     labels = [with_unit(one) for one in objectives]
     if len({*labels}) < len(labels):
-        labels = [f"{with_unit(one)}, {of_the_runs(one)}" for one in objectives]
-    values = np.array([design.objectives for design in found.designs])
-    feasible = np.array([design.feasible for design in found.designs])
-    front = [design.number - 1 for design in found.front]
-    chosen = None if found.chosen is None else found.chosen.number - 1
+        labels = [f"{with_unit(one)}, {statistic_over_runs(one)}" for one in objectives]
+    values = np.array([design.objectives for design in result.designs])
+    feasible = np.array([design.feasible for design in result.designs])
+    front = [design.number - 1 for design in result.front]
+    chosen = None if result.chosen is None else result.chosen.number - 1
     figure = front_figure(values, labels, feasible, front, chosen)
-    say_above(figure, f"{name}: {len(found.designs)} designs")
-    save(figure, found.folder / "front.png", overwrite=True)
-    if found.sensitivities and found.chosen is not None:
-        names = list(values_by_name(found.definition, found.designs))
-        figure = sensitivity_figure([one.record() for one in found.sensitivities], names)
-        say_above(figure, f"{name}: about design {found.chosen.number}")
-        save(figure, found.folder / "sensitivities.png", overwrite=True)
+    say_above(figure, f"{name}: {len(result.designs)} designs")
+    save(figure, result.folder / "front.png", overwrite=True)
+    if result.sensitivities and result.chosen is not None:
+        names = list(values_by_name(result.definition, result.designs))
+        figure = sensitivity_figure([one.record() for one in result.sensitivities], names)
+        say_above(figure, f"{name}: about design {result.chosen.number}")
+        save(figure, result.folder / "sensitivities.png", overwrite=True)
 
 
 def export_vehicles(evaluation: Evaluation, chosen: Design) -> list[Path]:
@@ -343,7 +343,7 @@ def export_vehicles(evaluation: Evaluation, chosen: Design) -> list[Path]:
     for (path, variable), text in zip(evaluation.variables, row, strict=True):
         texts += [f"{key}={text}" for key in (path, *variable.also)]
     overrides = split_overrides(texts)["vehicle"]
-    of_design = zip(evaluation.wanted.values.values(), chosen.values, strict=True)
+    of_design = zip(evaluation.problem.values.values(), chosen.values, strict=True)
     values = [f"# {name_of(v)}: {x:.6g} {unit_of(v.quantity)}".rstrip() for v, x in of_design]
     found = []
     for vehicle in evaluation.definition.vehicles:

@@ -41,12 +41,12 @@ class Outcome:
     @property
     def failed(self) -> tuple[Record, ...]:
         """Runs without a result."""
-        return self.records.where(lambda status: status == "failed")
+        return self.records.of_status(lambda status: status == "failed")
 
     @property
     def ended_early(self) -> tuple[Record, ...]:
         """Runs that ended early for a physical reason."""
-        return self.records.where(lambda status: status not in ("complete", "failed"))
+        return self.records.of_status(lambda status: status not in ("complete", "failed"))
 
     def without_effect(self) -> list[str]:
         """Return varied keys of files that change no peak of any run, such as what others replace.

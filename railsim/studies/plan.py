@@ -39,7 +39,7 @@ from railsim.files.access import TABLE_BYTES, is_file, read_bytes
 from railsim.result.extremes import BY_SIGN, FACTS, PEAK_QUANTITIES
 from railsim.studies.analyses import check_analyses, numbers_of
 from railsim.studies.case import Case, Loader, Overrides, run_labels, run_name
-from railsim.studies.rows import PERMITTED, Row, made_rows
+from railsim.studies.rows import PERMITTED, Row, combined_rows
 from railsim.studies.spec import MOST_RUNS, RunSpec, StudySpec
 from railsim.studies.user_function import fingerprint
 from railsim.units import ALLOWED, duration_in_words
@@ -79,14 +79,14 @@ class Plan:
             raise input_error("study", "no combination", "give a vehicle, a track, a speed")
         check_analyses(spec.analyses)
         self._spec = spec
-        self._loader = Loader(spec.combined, spec.analyses, contacts=True)
+        self._loader = Loader(spec.varied_keys, spec.analyses, contacts=True)
         # hashes of files; each is read once
         self._fingerprint = cache(self._with_overrides)
         self._base, self._content = cache(self._of_file), cache(_content_hash)
         # what the record of a run depends on besides the run
-        self._further = [f"told {told}"] if (told := fingerprint(spec.quantities)) else []
+        self._further = [f"told {function}"] if (function := fingerprint(spec.quantities)) else []
         self._further += [f"analyses {spec.analyses}"] if spec.analyses else []
-        self._further += [f"limits {self._limits(one)}" for one in spec.analyses.values()]
+        self._further += [f"limits {self._limits(analysis)}" for analysis in spec.analyses.values()]
         self._further += [f"keep {spec.keep}"] if spec.keep != "all" else []
         self._further += ["single"] if spec.single else []
         linked = [next(iter(table.values())) for table in spec.linked]
@@ -95,37 +95,37 @@ class Plan:
         number = math.prod(map(len, lists)) * (spec.sample.number if spec.sample else 1)
         check_number(number, workers, self._simulated_time)
         self._loader.overrides(tuple(spec.assignments))  # its faults come first
-        rows = made_rows(spec.grid, spec.linked, spec.sample)
+        rows = combined_rows(spec.grid, spec.linked, spec.sample)
         of_rows = ([f"{key}={value}" for key, value in row.values.items()] for row in rows)
         assigned = [(*spec.assignments, *texts) for texts in of_rows]
         shared = spec.settings, spec.start, spec.duration, spec.until
         self.points: list[Point] = []
         for vehicle, track, speed in product(spec.vehicles, spec.tracks, spec.speeds):
             for row, assignments in zip(rows, assigned, strict=True):
-                wanted = speed if row.speed is None else row.speed
-                given = None if isinstance(wanted, str) else wanted
-                run = RunSpec(vehicle, track, given, *shared, assignments)
-                permitted = isinstance(wanted, str)
-                first = self._permitted(run) if permitted else self._loader.first_speed(run)
-                run = run if first is given else replace(run, speed=first)
+                requested = speed if row.speed is None else row.speed
+                number_or_none = None if isinstance(requested, str) else requested
+                run = RunSpec(vehicle, track, number_or_none, *shared, assignments)
+                permitted = isinstance(requested, str)
+                first = self._permitted_speed(run) if permitted else self._loader.first_speed(run)
+                run = run if first is number_or_none else replace(run, speed=first)
                 self.points.append(self._point(run, row))
 
     def _point(self, run: RunSpec, row: Row) -> Point:
         overrides = self._loader.overrides(run.assignments)
         each = ((kind, getattr(run, kind), some) for kind, some in overrides.items())
-        parts = [self._fingerprint(*one) for one in each]
+        parts = [self._fingerprint(*definition) for definition in each]
         inputs = (*parts, run.speed, run.start, run.duration, run.until, *self._further)
-        key = "" if "" in parts else _hashed([__version__, *map(repr, inputs)])
+        key = "" if "" in parts else _hash([__version__, *map(repr, inputs)])
         labels = {**run_labels(run), **row.values}
         return Point(run_name(run) + row.suffix, run, labels, key, needs_run(self._spec.analyses))
 
     def cases(self, points: Sequence[Point] | None = None) -> list[Case]:
         """Load the inputs of some points, by default all; raises InputError: all their faults."""
-        wanted = self.points if points is None else points
-        found = [self._loader.case(point.name, point.run, point.labels) for point in wanted]
+        requested = self.points if points is None else points
+        cases = [self._loader.case(point.name, point.run, point.labels) for point in requested]
         self._loader.check()
         check_names(self.points)
-        return [case for case in found if case is not None]
+        return [case for case in cases if case is not None]
 
     def _limits(self, analysis: Analysis) -> str:
         """Return a hash of the limits file of an analysis, which is checked; empty without one."""
@@ -136,7 +136,7 @@ class Plan:
         limits_of(analysis.standard, analysis.limits)
         return self._fingerprint("limits", analysis.limits, ())
 
-    def _permitted(self, run: RunSpec) -> float | None:
+    def _permitted_speed(self, run: RunSpec) -> float | None:
         """Return the lower of the admissible speed of a vehicle and the speed of a track [m/s]."""
         vehicle, track = (self._loader.definition(kind, run) for kind in ("vehicle", "track"))
         if vehicle is None or track is None:
@@ -169,7 +169,7 @@ class Plan:
         if not base:
             return ""
         named = [self._content(name) for text in overrides for name in _named_files(text)]
-        return _hashed([base, *overrides, *named])
+        return _hash([base, *overrides, *named])
 
     def _of_file(self, kind: str, path: str | Path | None) -> str:
         if path is None:
@@ -179,10 +179,10 @@ class Plan:
         except InputError:
             return ""
         text = json.dumps(data, sort_keys=True, default=str)
-        return _hashed([text, *(self._content(name) for name in _file_names(data))])
+        return _hash([text, *(self._content(name) for name in _file_names(data))])
 
 
-def _hashed(parts: Sequence[str]) -> str:
+def _hash(parts: Sequence[str]) -> str:
     return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
 
 
@@ -241,20 +241,20 @@ def check_study(study: Study) -> None:
     ).check()  # fmt: skip
 
 
-def selects(one: Value, labels: Mapping[str, Any]) -> bool:
+def selects(criterion: Value, labels: Mapping[str, Any]) -> bool:
     """Whether a run has the labels of a value of an optimisation."""
-    return all(_alike(labels.get(key), wanted) for key, wanted in one.where.items())
+    return all(_alike(labels.get(key), value) for key, value in criterion.where.items())
 
 
-def _alike(label: object, wanted: object) -> bool:
+def _alike(label: object, value: object) -> bool:
     """Whether a label, a text in a grid, equals a value."""
     try:
-        return label == wanted or float(str(label)) == float(str(wanted))
+        return label == value or float(str(label)) == float(str(value))
     except ValueError:
         return False
 
 
-def _check_quantities(study: Study, wanted: Optimise) -> None:
+def _check_quantities(study: Study, problem: Optimise) -> None:
     """Refuse quantities that no run of an optimisation can have."""
     known, forms = list[str](), list[str]()
     if needs_run(study.analyses):
@@ -264,15 +264,15 @@ def _check_quantities(study: Study, wanted: Optimise) -> None:
         forms += [rf"({'|'.join(known)})_(time|distance|20hz)"]
         forms += [rf"({'|'.join(PEAK_QUANTITIES)})_(mid|median)\d*"]
         known += ["speed", *(name for name in FACTS if not name.startswith("status"))]
-    for own, analysis in study.analyses.items():
-        known += [f"{own}.{number}" for number in numbers_of(analysis)]
+    for analysis_name, analysis in study.analyses.items():
+        known += [f"{analysis_name}.{number}" for number in numbers_of(analysis)]
         if isinstance(analysis, AssessAnalysis):  # the standard says its numbers
-            forms.append(rf"{own}\..*")
-    some = re.compile("|".join([*map(re.escape, known), *forms]))
+            forms.append(rf"{analysis_name}\..*")
+    pattern = re.compile("|".join([*map(re.escape, known), *forms]))
     Faults(
-        Fault("study", f"{key}.quantity", f"no run has '{one}'", nearest(one, known), "--optimise")
-        for key, one in ((key, value.quantity) for key, value in wanted.values.items())
-        if not some.fullmatch(one)
+        Fault("study", f"{k}.quantity", f"no run has '{name}'", nearest(name, known), "--optimise")
+        for k, name in ((k, value.quantity) for k, value in problem.values.items())
+        if not pattern.fullmatch(name)
     ).check()
 
 

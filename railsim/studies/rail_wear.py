@@ -38,17 +38,17 @@ def rail_wear(
     def depths(result: Result, law: WearLaw) -> dict[str, Floats]:
         load = float(np.sum(result["Q0"])) / GRAVITY
         passes = range(len(result.wheelsets))
-        own = (sum(rail_depth(result, w, side, law) for w in passes) for side in (0, 1))
-        return {side: np.asarray(depth / load) for side, depth in zip(SIDES, own, strict=True)}
+        both = (sum(rail_depth(result, w, side, law) for w in passes) for side in (0, 1))
+        return {side: np.asarray(depth / load) for side, depth in zip(SIDES, both, strict=True)}
 
     needed: dict[str, Any] = {"outputs": ("contact_patches", "track"), "unit": "Mt", "scale": 1e-9}
-    return carry_out(Wearing(runs, new, sides, depths, given="traffic", **needed), Loop(**how))
+    return carry_out(Wearing(runs, new, sides, depths, parameter="traffic", **needed), Loop(**how))
 
 
-def rail_rows(found: Sequence[WearStep]) -> dict[str, list[dict[str, float | None]]]:
+def rail_rows(steps: Sequence[WearStep]) -> dict[str, list[dict[str, float | None]]]:
     """Wear of both rails after each step of `rail_wear`, by side.
 
     `distance` is the tonnage [kg]; `area`, `deepest` and `deepest_y` (from the rail's middle, field
     side positive) as of `wear_rows`.
     """
-    return {side: [row(*of) for of in since_new(found, side)] for side in SIDES}
+    return {side: [row(*state) for state in since_new(steps, side)] for side in SIDES}

@@ -21,21 +21,21 @@ def write_record(path: Path, record: Record) -> None:
     write_text(path, json.dumps({"crc32": _crc(record), "record": record}))
 
 
-def kept_record(path: Path | None, remark: Callable[[str], None]) -> Record | None:
+def stored_record(path: Path | None, remark: Callable[[str], None]) -> Record | None:
     """Return a record stored before, if any; one that is damaged is removed, with a remark."""
     if path is None or not path.exists():
         return None
-    words = f"{path}: the record is damaged"
+    reason = f"{path}: the record is damaged"
     try:
-        stored = json.loads(read_text(path, TABLE_BYTES))
-        record: Record = stored["record"]
-        if stored["crc32"] == _crc(record):
+        content = json.loads(read_text(path, TABLE_BYTES))
+        record: Record = content["record"]
+        if content["crc32"] == _crc(record):
             return record
     except InputError as error:
-        words = str(error)
+        reason = str(error)
     except (ValueError, TypeError, KeyError, RecursionError):
         pass
-    remark(f"{words}: it is computed again")
+    remark(f"{reason}: it is computed again")
     path.unlink()
     return None
 
@@ -45,7 +45,7 @@ def _crc(record: Any) -> str:
     return f"{zlib.crc32(json.dumps(record).encode()):08x}"
 
 
-def parsed(text: bytes) -> Any:
+def parse_json(text: bytes) -> Any:
     """Return what JSON holds; raises ValueError: it is broken, or nested too deeply."""
     try:
         return orjson.loads(text)

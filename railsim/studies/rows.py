@@ -25,23 +25,23 @@ class Row:
     speed: float | None = None  # of the run if the row varies it [m/s]
 
 
-def made_rows(grid: Grid, linked: Sequence[Grid], sample: Sample | None) -> list[Row]:
+def combined_rows(grid: Grid, linked: Sequence[Grid], sample: Sample | None) -> list[Row]:
     """Return all combinations: the grid outermost, then linked keys, then the sample."""
     combined = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
     for table in linked:
         each = zip(*table.values(), strict=True)
         together = [dict(zip(table, values, strict=True)) for values in each]
-        combined = [{**row, **more} for row in combined for more in together]
+        combined = [{**row, **linked_values} for row in combined for linked_values in together]
     members = [("", dict[str, str]())]
     if sample is not None:
-        drawn = sampled(sample)
-        width = len(str(len(drawn)))
-        members = [(f"_sample={n:0{width}d}", values) for n, values in enumerate(drawn, start=1)]
+        draws = draw_sample(sample)
+        width = len(str(len(draws)))
+        members = [(f"_sample={n:0{width}d}", values) for n, values in enumerate(draws, start=1)]
     rows = []
     for row in combined:
         name = suffix({key: value for key, value in row.items() if key != SPEED})
-        for ending, drawn_values in members:
-            values = {**row, **drawn_values}
+        for ending, sample_values in members:
+            values = {**row, **sample_values}
             speed = values.pop(SPEED, None)
             rows.append(Row(values, name + ending, None if speed is None else speed_of(speed)))
     return rows
@@ -52,13 +52,13 @@ SPEEDS = "such as 20 or 72km/h; blanks between several"
 
 def speed_of(text: str) -> float:
     """Return the speed of a text, perhaps with a unit [m/s]; raises InputError: it is no number."""
-    found = speed_in_si(text)
-    if isinstance(found, str):
+    speed = speed_in_si(text)
+    if isinstance(speed, str):
         raise argument_error("speeds", f"'{text}' is not a speed", SPEEDS)
-    return float(found)
+    return float(speed)
 
 
-def sampled(sample: Sample) -> list[dict[str, str]]:
+def draw_sample(sample: Sample) -> list[dict[str, str]]:
     """Return the values of a sample, one mapping for each of its members.
 
     Latin hypercube and Sobol's sequence by scipy: the values of each parameter are stratified over
@@ -71,7 +71,7 @@ def sampled(sample: Sample) -> list[dict[str, str]]:
     engine = qmc.Sobol if sample.method == "sobol" else qmc.LatinHypercube
     spreads = sample.parameters.values()
     rows = engine(d=count, seed=sample.seed).random(sample.number).tolist()
-    values = ([f"{one:.10g}" for one in map(quantile, spreads, row)] for row in rows)
+    values = ([f"{number:.10g}" for number in map(quantile, spreads, row)] for row in rows)
     return [dict(zip(sample.parameters, row, strict=True)) for row in values]
 
 

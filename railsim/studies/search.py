@@ -112,7 +112,7 @@ def _promising(designs: Floats, values: Values, size: int, rng: np.random.Genera
         free = distance > SMALLEST_DISTANCE
         if not free.any():
             break
-        worth = np.where(allowed & free, gain.of(objectives), 0.0)
+        worth = np.where(allowed & free, gain.volume_share(objectives), 0.0)
         explore = number == size - 1 and size > 1
         pick = int(np.argmax(np.where(free, distance, 0.0) if explore or worth.max() <= 0.0
                              else worth + 1e-9 * distance))  # fmt: skip
@@ -146,7 +146,7 @@ class _Gain:
         for row in front:
             self.take(row)
 
-    def of(self, objectives: Floats) -> Floats:
+    def volume_share(self, objectives: Floats) -> Floats:
         """Return the share of the volume that each candidate would add."""
         left = self._points[self._open]
         dominated = np.ones((len(objectives), len(left)), bool)
@@ -275,7 +275,7 @@ METHODS = {
 }
 
 
-def varied(values: Floats) -> Flags:
+def varies(values: Floats) -> Flags:
     """Return which columns vary by more than round-off, as of eigenvalues."""
     high, low = values.max(axis=0, initial=-np.inf), values.min(axis=0, initial=np.inf)
     return np.asarray(high - low > ROUND_OFF * np.minimum(np.abs(high), np.abs(low)))
@@ -293,7 +293,7 @@ def non_dominated(values: Floats) -> Flags:
     [True, False]
     """
     known = np.logical_not(np.isnan(values).any(axis=1))
-    values = np.where(varied(values[known]), values, 0.0)
+    values = np.where(varies(values[known]), values, 0.0)
     found = np.zeros(len(values), dtype=np.bool_)
     front = np.empty((0, values.shape[1]))
     for i in np.lexsort(values.T[::-1]):  # a row can only be dominated by rows before it

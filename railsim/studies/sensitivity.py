@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.studies.search import Surrogate, varied
+from railsim.studies.search import Surrogate, varies
 
 DOUBTFUL = 0.05  # share of the variance that a surrogate misses, from which it is said
 SAMPLES = 1024  # a power of two, times the number of variables and two
@@ -60,7 +60,7 @@ def sensitivities(
 
     count = len(variables)
 
-    def named(values: Floats) -> dict[str, float]:
+    def table(values: Floats) -> dict[str, float]:
         return dict(zip(variables, values.tolist(), strict=True))
 
     known = ~np.isnan(values).any(axis=1)
@@ -71,7 +71,7 @@ def sensitivities(
     ends[np.arange(count), np.arange(count)] = 0.0
     ends[count + np.arange(count), np.arange(count)] = 1.0
     low, high = np.split(model(ends), 2)
-    explained = np.flatnonzero(varied(values[known]))  # the rest has no variance
+    explained = np.flatnonzero(varies(values[known]))  # the rest has no variance
     first, total = np.zeros((2, len(quantities), count))
     if count == 1:
         first[explained] = total[explained] = 1.0
@@ -83,6 +83,6 @@ def sensitivities(
     errors = model.errors()
     found = []
     for k, quantity in enumerate(quantities):
-        tornado, sobol = (named(low[:, k]), named(high[:, k])), (named(first[k]), named(total[k]))
+        tornado, sobol = ((table(low[:, k]), table(high[:, k])), (table(first[k]), table(total[k])))
         found.append(Sensitivity(quantity, *tornado, *sobol, float(errors[k])))
     return found

@@ -82,7 +82,7 @@ def _table(table: Any, option: str = "grid") -> Any:
     return {key: _texts(f"{option} {key}", values) for key, values in table.items()}
 
 
-def _linked(table: Any) -> Any:
+def _linked_texts(table: Any) -> Any:
     """Return the values of linked keys as texts; raises InputError: not equally many of each."""
     texts = _table(table, "linked")
     if isinstance(texts, Mapping) and len(set(map(len, texts.values()))) > 1:
@@ -91,10 +91,10 @@ def _linked(table: Any) -> Any:
     return texts
 
 
-def _stored(value: Any) -> Any:
+def _plain_data(value: Any) -> Any:
     """Return definitions as plain data without what is not given."""
     if isinstance(value, Mapping):
-        return {name: _stored(one) for name, one in value.items()}
+        return {name: _plain_data(definition) for name, definition in value.items()}
     return value if value is None else value.model_dump(mode="json", exclude_none=True)
 
 
@@ -115,10 +115,10 @@ class StudySpec(BaseModel):
     tracks: Annotated[list[str], BeforeValidator(_file_names)]
     speeds: Annotated[list[float | str | None], BeforeValidator(_speeds)]
     grid: Annotated[dict[str, list[str]], BeforeValidator(_table)] = {}
-    linked: list[Annotated[dict[str, list[str]], BeforeValidator(_linked)]] = []
-    sample: Annotated[Sample | None, PlainSerializer(_stored)] = None
+    linked: list[Annotated[dict[str, list[str]], BeforeValidator(_linked_texts)]] = []
+    sample: Annotated[Sample | None, PlainSerializer(_plain_data)] = None
     quantities: str | None = None  # ``FILE.py:FUNCTION``, see `railsim.studies.user_function`
-    analyses: Annotated[dict[Name, Analysis], PlainSerializer(_stored)] = {}
+    analyses: Annotated[dict[Name, Analysis], PlainSerializer(_plain_data)] = {}
     keep: str = "all"  # of each result, see `kept_quantities`
     compress: bool = False
     single: bool = False
@@ -132,24 +132,24 @@ class StudySpec(BaseModel):
     def of_file(cls, study: Study, **changes: Any) -> "StudySpec":
         """Return the study of a study file, with changes."""
         names = cls.model_fields.keys() & type(study).model_fields.keys()
-        return checked(cls, {name: getattr(study, name) for name in names} | changes, "study")
+        return validated(cls, {name: getattr(study, name) for name in names} | changes, "study")
 
     def changed(self, **changes: Any) -> "StudySpec":
         """Return a study with other inputs."""
         return self.model_copy(update=changes)
 
     @property
-    def combined(self) -> set[str]:
+    def varied_keys(self) -> set[str]:
         """Keys of grid and linked tables."""
         return {*self.grid, *(key for table in self.linked for key in table)}
 
     @property
     def overruled(self) -> list[str]:
         """Assignments whose keys vary, so that no run has their values."""
-        varied = self.combined.union(self.sample.parameters if self.sample else ())
+        varied = self.varied_keys.union(self.sample.parameters if self.sample else ())
         return [one for one in self.assignments if one.partition("=")[0].strip() in varied]
 
-    def stored(self) -> dict[str, Any]:
+    def as_data(self) -> dict[str, Any]:
         """Return the study as plain data."""
         return self.model_dump(mode="json")
 
@@ -164,7 +164,7 @@ class Execution:
     overwrite: bool = False
     plots: bool = False
     longest_first: bool = False  # to balance the load of the cores
-    beside: tuple[str, ...] = ()  # files written beside the runs: those of others are refused
+    further_files: tuple[str, ...] = ()  # beside those of runs: files of others are refused
     trying: bool = False  # a run that cannot be computed is an outcome like others
     progress: Progress | None = None
     on_record: Callable[[dict[str, Any]], None] | None = None
@@ -190,17 +190,17 @@ def kept_quantities(keep: str) -> tuple[str, ...]:
         return ("*",) if keep == "all" else ()
     names = tuple(name.strip() for name in keep.split(",") if name.strip())
     known = [*QUANTITIES, *REQUESTED]
-    wrong = [name for name in names if not any(fnmatchcase(one, name) for one in known)]
+    wrong = [name for name in names if not any(fnmatchcase(quantity, name) for quantity in known)]
     if wrong or not names:
         known = ["all", "summary", *known]
-        words = "no such quantity"
+        found = "no such quantity"
         raise InputError(
-            argument_fault("keep", n, words, nearest(n, known)) for n in wrong or [keep]
+            argument_fault("keep", n, found, nearest(n, known)) for n in wrong or [keep]
         )
     return names
 
 
-def checked(model: type[M], data: Any, file: str) -> M:
+def validated(model: type[M], data: Any, file: str) -> M:
     """Return data as a model; raises InputError: all faults of the data."""
     try:
         return model.model_validate(data)

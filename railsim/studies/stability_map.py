@@ -20,7 +20,7 @@ from railsim.linear.vehicle import AMPLITUDE, Contact
 from railsim.processes import WorkerPool, available_cores
 from railsim.profiles.used import profile_hashes
 from railsim.stability.critical_speed import checked, critical_speed
-from railsim.studies.records import Record, kept_record, write_record
+from railsim.studies.records import Record, stored_record, write_record
 from railsim.studies.spec import Progress
 from railsim.table import Column, Table
 from railsim.version import __version__
@@ -55,25 +55,25 @@ def stability_map(
     """
     contact = options["linearisation"], options["amplitude"]
     others = {"linearisation", "amplitude", "over_amplitude"}
-    own = {name: value for name, value in options.items() if name not in others}
+    search_options = {name: value for name, value in options.items() if name not in others}
     for conicity in dict.fromkeys(point.at.get("conicity") for point in points):
-        checked(Contact(*contact, conicity), **own)  # before the first point is computed
+        checked(Contact(*contact, conicity), **search_options)  # before the first point is computed
     paths = [_stored_path(folder, point, options) for point in points]
-    kept = {} if overwrite else {k: kept_record(path, on_remark) for k, path in enumerate(paths)}
-    found = {number: record for number, record in kept.items() if record is not None}
-    progress(len(found) / len(points))
-    waiting = {number: point for number, point in enumerate(points) if number not in found}
+    stored = {} if overwrite else {k: stored_record(p, on_remark) for k, p in enumerate(paths)}
+    records = {number: record for number, record in stored.items() if record is not None}
+    progress(len(records) / len(points))
+    waiting = {number: point for number, point in enumerate(points) if number not in records}
     count = min(workers or available_cores(), max(1, len(waiting)))
-    for number, record in _computed(waiting, options, count):
-        found[number] = record
+    for number, record in _compute(waiting, options, count):
+        records[number] = record
         path = paths[number]
         if path is not None:
             write_record(path, record)
-        progress(len(found) / len(points))
-    return [found[number] for number in range(len(points))]
+        progress(len(records) / len(points))
+    return [records[number] for number in range(len(points))]
 
 
-def _computed(
+def _compute(
     waiting: Mapping[int, MapPoint], options: dict[str, Any], workers: int
 ) -> Iterator[tuple[int, Record]]:
     """Yield number and record of each point as it ends."""
@@ -91,14 +91,14 @@ def point_record(point: MapPoint, options: dict[str, Any]) -> Record:
     """Record of one point."""
     conicity = {"conicity": point.at["conicity"]} if "conicity" in point.at else {}
     try:
-        found = critical_speed(
+        speeds = critical_speed(
             point.vehicle, point.track, settings=point.settings, **{**options, **conicity}
         )
     except RailsimError as error:
         where = ", ".join(f"{name} {value}" for name, value in point.at.items())
         why = f"{where}: {error}"
         return {"at": point.at, "linear": None, "nonlinear": None, "remarks": [why]}
-    return {"at": point.at, **found.record()}
+    return {"at": point.at, **speeds.record()}
 
 
 def _stored_path(folder: Path | None, point: MapPoint, options: dict[str, Any]) -> Path | None:

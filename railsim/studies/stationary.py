@@ -109,7 +109,7 @@ class Stationary:
                    Column("value", format=">"), Column("limit", format=">")]  # fmt: skip
         number, angle = Column("", format=".3f"), Column("", unit="deg", format=".2f")
 
-        def shown(quantity: str, value: float | None, limit: float | None = None) -> object:
+        def cell(quantity: str, value: float | None, limit: float | None = None) -> object:
             if value is None or np.isnan(value):
                 return None
             if np.isinf(value):
@@ -117,8 +117,8 @@ class Stationary:
             column = angle if quantity.startswith("angle") else number
             return Amount(value, column, with_unit=True, limit=limit)
 
-        rows = [[v.case, v.quantity, v.place, shown(v.quantity, v.value, v.limit),
-                 shown(v.quantity, v.limit)] for v in self.values]  # fmt: skip
+        rows = [[v.case, v.quantity, v.place, cell(v.quantity, v.value, v.limit),
+                 cell(v.quantity, v.limit)] for v in self.values]  # fmt: skip
         return Table(columns, rows)
 
     def plot(
@@ -178,7 +178,7 @@ def stationary(
     values: list[StationaryValue] = []
     reasons: list[str] = []
 
-    def found(case: str, stand: Callable[[], S]) -> S | None:
+    def solve(case: str, stand: Callable[[], S]) -> S | None:
         try:
             return stand()
         except NotConverged as error:
@@ -187,7 +187,7 @@ def stationary(
 
     loops: dict[str, TwistLoop] = {}
     for name, heights in twists.items():
-        loop = found(name, partial(twist_loop, balance, track, heights, held=held))
+        loop = solve(name, partial(twist_loop, balance, track, heights, held=held))
         if loop is not None:
             loops[name] = loop
         values += _unloading(name, loop, limits.unloading, has_pads(balance.model))
@@ -198,18 +198,18 @@ def stationary(
     for hand, bend in (("right", 1.0), ("left", -1.0)):
         bend /= limits.guiding.radius
         case = f"{curve} to the {hand}"
-        force = found(f"{case}, level", partial(_force, vehicle, balance, track, settings, bend))
+        force = solve(f"{case}, level", partial(_force, vehicle, balance, track, settings, bend))
         forces.append(np.nan if force is None else force)
         for sign in (1.0, -1.0):
             roll = partial(_quotient, balance, track, sign * heights, bend)
-            combined = found(f"{case}, {name}", roll)
+            combined = solve(f"{case}, {name}", roll)
             quotients.append(np.nan if combined is None else combined)
-    level = _over(float(np.fmax.reduce(forces)), load)
-    values.append(_judged(f"{curve}, level", "guiding Y/Q", level, limits.guiding))
+    level = _y_over_q(float(np.fmax.reduce(forces)), load)
+    values.append(_value(f"{curve}, level", "guiding Y/Q", level, limits.guiding))
     worst = float(np.fmax.reduce(quotients))
-    values.append(_judged(f"{curve}, {name}", "guiding Y/Q, combined", worst, limits.guiding))
+    values.append(_value(f"{curve}, {name}", "guiding Y/Q, combined", worst, limits.guiding))
     name = f"cant {1e3 * cant:g} mm"
-    both = found(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
+    both = solve(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
     values += _lean(name, balance.model, flat.reference, both or [], cant, limits)
     omitted = left_out(vehicle, track, settings, model)
     remarks = (*balance.remarks, *profile_remarks(model), *omitted)
@@ -270,7 +270,7 @@ def _unloading(
         wheelset, side = loop.worst
         wheel = f"wheelset {wheelset + 1} {SIDES[side]}"
         worst, left = float(np.max(1.0 - loop.smallest / loop.Q0)), loop.on_level
-    values = [_judged(case, UNLOADING, worst, limit, wheel)]
+    values = [_value(case, UNLOADING, worst, limit, wheel)]
     for name, value in zip(level, left, strict=True) if friction else ():
         values.append(StationaryValue(case, name, value, None, wheel))
     return values
@@ -295,28 +295,28 @@ def _force(
         if found.converged.item() == FAILED:
             raise
         Y = found.Y.reshape(-1, 2)
-    outer, outwards = _outer(bend)
+    outer, outwards = _outer_wheel(bend)
     return float("nan") if Y is None else outwards * float(Y[0, outer])
 
 
 def _quotient(balance: Equilibrium, track: Track, heights: Floats, bend: float) -> float:
     """Y/Q of the leading outer wheel in a twisted curve, outwards positive."""
-    state, (outer, outwards) = on_twist(balance, track, heights, curvature=bend), _outer(bend)
+    state, (outer, outwards) = on_twist(balance, track, heights, curvature=bend), _outer_wheel(bend)
     assert state.Y is not None  # its wheelsets roll
-    return _over(outwards * float(state.Y[0, outer]), float(state.Q[0, outer]))
+    return _y_over_q(outwards * float(state.Y[0, outer]), float(state.Q[0, outer]))
 
 
-def _over(Y: float, Q: float) -> float:
+def _y_over_q(Y: float, Q: float) -> float:
     """Y/Q; infinite of a wheel without load, held ones being drawn by their rails: no pass."""
     return np.inf if Q <= 0.0 else Y / Q
 
 
-def _outer(bend: float) -> tuple[int, float]:
+def _outer_wheel(bend: float) -> tuple[int, float]:
     """Side of the outer wheels in a curve, and the sign of forces outwards."""
     return (0, -1.0) if bend > 0.0 else (1, 1.0)
 
 
-def _judged(
+def _value(
     case: str, quantity: str, value: float, limit: Value, place: str = "wheelset 1 outer"
 ) -> StationaryValue:
     return StationaryValue(case, quantity, value, limit.value, place, limit.source, limit.checked)
@@ -345,7 +345,7 @@ def _lean(
         share, most = float(np.mean(rolls)), max(rolls)
     floor = float(np.arcsin(cant / CANT_BASE)) * (1.0 + most)
     return [
-        _judged(case, UNLOADING, worst, limits.lean_unloading, wheel),
-        _judged(case, "angle of the floor", floor, limits.lean_angle, body),
+        _value(case, UNLOADING, worst, limits.lean_unloading, wheel),
+        _value(case, "angle of the floor", floor, limits.lean_angle, body),
         StationaryValue(case, "roll coefficient", share, None, body),
     ]

@@ -20,7 +20,7 @@ from railsim.studies.journal import JOURNAL, Journal
 from railsim.studies.outcome import Outcome
 from railsim.studies.plan import Plan
 from railsim.studies.records import Record
-from railsim.studies.spec import Execution, Progress, StudySpec, checked
+from railsim.studies.spec import Execution, Progress, StudySpec, validated
 from railsim.studies.summary import read_index, refuse_too_many
 from railsim.studies.user_function import Function, full_name
 from railsim.version import __version__
@@ -153,7 +153,7 @@ def study(
         on_record=on_record,
         on_remark=on_remark,
     )
-    return run_study(checked(StudySpec, inputs, "study"), folder, execution)
+    return run_study(validated(StudySpec, inputs, "study"), folder, execution)
 
 
 def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
@@ -207,7 +207,7 @@ def stored_spec(folder: Path) -> tuple[StudySpec, Path]:
         inputs = read_index(index).inputs
     else:
         refuse_too_many(data, str(folder / JOURNAL))
-        inputs = checked(StudySpec, data, str(folder / JOURNAL))
+        inputs = validated(StudySpec, data, str(folder / JOURNAL))
     base = (folder / inputs.folder).resolve()
     return inputs, base if os.path.isdir(base) else Path.cwd()
 
@@ -219,13 +219,13 @@ def as_files(inputs: Any, folder: Path) -> list[str]:
     """Return one or several inputs as files; definitions are written if they do not exist."""
     single = not isinstance(inputs, Iterable) or isinstance(inputs, str | Path | FileDefinition)
     texts: dict[str, str] = {}  # of the definitions, by name
-    found = []
+    files = []
     for one in [inputs] if single else inputs:
         if not isinstance(one, str | Path | FileDefinition):
             words = "give files, names of shipped ones, or what railsim.load_vehicle returns"
             raise TypeError(f"one of the inputs of the study is a {type(one).__name__}; {words}")
         if not isinstance(one, FileDefinition):
-            found.append(str(one))
+            files.append(str(one))
             continue
         text = one.to_toml()
         base = _slug(str(getattr(one, "name", "settings")))
@@ -236,8 +236,8 @@ def as_files(inputs: Any, folder: Path) -> list[str]:
         if not (path.is_file() and path.read_bytes() == text.encode()):
             make_folder(path.parent)
             write_text(path, text)
-        found.append(str(path))
-    return found
+        files.append(str(path))
+    return files
 
 
 def _slug(name: str) -> str:

@@ -22,10 +22,10 @@ from railsim.files.access import is_file, read_text, whole_file
 from railsim.notation import QUANTITIES
 from railsim.result import Result
 from railsim.result.extremes import FACTS, run_facts
-from railsim.studies.analyses import analysed
+from railsim.studies.analyses import numbers_and_remarks
 from railsim.studies.journal import JOURNAL, NOT_DONE, Records
-from railsim.studies.records import Record, json_bytes, parsed
-from railsim.studies.spec import MOST_RUNS, StudySpec, checked
+from railsim.studies.records import Record, json_bytes, parse_json
+from railsim.studies.spec import MOST_RUNS, StudySpec, validated
 from railsim.studies.user_function import user_quantities
 from railsim.text import spreadsheet_cell
 from railsim.units import number_with_unit
@@ -51,18 +51,18 @@ def waiting_record(case: "Case") -> Record:
 
 
 def finished_record(
-    case: "Case", result: Result, function: str | None = None, known: Record | None = None
+    case: "Case", result: Result, function: str | None = None, prior: Record | None = None
 ) -> Record:
     """Return the record of a run with its own quantities and analyses; RailsimError: one fails.
 
-    `known`: an earlier record of the run, from all its quantities; the result may be reduced.
+    `prior`: an earlier record of the run, from all its quantities; the result may be reduced.
     """
-    numbers, said = analysed(case, result)
+    numbers, remarks = numbers_and_remarks(case, result)
     facts = {**waiting_record(case), **run_facts(result, case.track)}
-    facts |= {name: known[name] for name in ("peaks", "mid_curves") if known and name in known}
-    facts["remarks"] = [*facts["remarks"], *said]
-    found = user_quantities(function, result) | numbers
-    return {**facts, "quantities": found} if function or case.analyses else facts
+    facts |= {name: prior[name] for name in ("peaks", "mid_curves") if prior and name in prior}
+    facts["remarks"] = [*facts["remarks"], *remarks]
+    quantities = user_quantities(function, result) | numbers
+    return {**facts, "quantities": quantities} if function or case.analyses else facts
 
 
 def failed_record(case: "Case", error: Exception | str) -> Record:
@@ -134,7 +134,7 @@ def read_index(path: Path) -> Index:
     index = index if isinstance(index, dict) else {"format": None}
     if index.get("format") == FORMAT:
         refuse_too_many(index.get("inputs"), str(path))
-    return checked(Index, index, str(path))
+    return validated(Index, index, str(path))
 
 
 def refuse_too_many(inputs: Any, file: str) -> None:
@@ -202,7 +202,7 @@ def _csv_line(cells: list[Any]) -> bytes:
 @lru_cache(10_000)  # names of wheelsets and the like
 def _csv_cell(text: bytes) -> bytes:
     """A cell of CSV from a text of JSON, or from null."""
-    value = str(spreadsheet_cell(parsed(text) or ""))
+    value = str(spreadsheet_cell(parse_json(text) or ""))
     if re.search('[,"\r\n]', value):
         value = '"' + value.replace('"', '""') + '"'
     return value.encode("utf-8", "surrogateescape")
@@ -243,8 +243,8 @@ def _columns_of_peak(quantity: str, kind: str) -> tuple[str, dict[str, str]]:
 
 def summary_row(record: Record) -> dict[str, Any]:
     """Return the cells of the line of a run by the names of their columns, without units, in SI."""
-    given = ((n, value, number_with_unit(str(value))) for n, value in record["labels"].items())
-    labels = {n: value if si is None or "." not in n else si for n, value, si in given}
+    cells = ((n, value, number_with_unit(str(value))) for n, value in record["labels"].items())
+    labels = {n: value if si is None or "." not in n else si for n, value, si in cells}
     row = {"name": record["name"], **labels, "file": record["file"]}
     row |= {name: record.get(name, "") for name in FACTS}
     row["remarks"] = " ".join(record.get("remarks", ()))

@@ -44,11 +44,11 @@ def full_name(function: "str | Function | None") -> str | None:
     if not (file.endswith(".py") and name.isidentifier()):
         raise argument_error(PARAMETER, "not understood", f"allowed: {ALLOWED}", key=function)
     whole = f"{Path(file).resolve()}:{name}"
-    _loaded(whole, fingerprint(whole))
+    _load(whole, fingerprint(whole))
     return whole
 
 
-def given_again(stored: str | None, option: str | None) -> str | None:
+def function_to_resume(stored: str | None, option: str | None) -> str | None:
     """Return the function of a study that is continued, as `full_name`.
 
     The folder of a study may come from somebody else, and a function is code: the one that the
@@ -77,7 +77,7 @@ def user_quantities(name: str | None, result: Result) -> dict[str, float]:
     if name is None:
         return {}
     try:
-        values = dict(_loaded(name, fingerprint(name))(result))
+        values = dict(_load(name, fingerprint(name))(result))
         found = {key: float(value) for key, value in values.items()}
         for key, number in found.items():
             if not isinstance(key, str) or not key.isprintable() or not key:
@@ -90,7 +90,7 @@ def user_quantities(name: str | None, result: Result) -> dict[str, float]:
 
 
 @cache
-def _loaded(name: str, _: str) -> Function:
+def _load(name: str, _: str) -> Function:
     """Load a function; the hash of its file has it loaded anew when that has changed."""
     file, _, function = name.rpartition(":")
     try:

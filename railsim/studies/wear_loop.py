@@ -34,7 +34,7 @@ from railsim.result import Result
 from railsim.result.hunting import HUNTS
 from railsim.simulation import simulate
 from railsim.simulation.conditions import SPEED_RANGE
-from railsim.studies.records import kept_record, write_record
+from railsim.studies.records import stored_record, write_record
 from railsim.studies.spec import Progress
 from railsim.version import __version__
 
@@ -142,10 +142,10 @@ def wear_loop(
         of_wheels = [worn_depth(result, wheelset, side, law) for wheelset, side in wheels]
         return {WHEEL: np.asarray(np.mean(of_wheels, axis=0))}
 
-    def ended(worn: Mapping[str, Profile]) -> str:
+    def end_reason(worn: Mapping[str, Profile]) -> str:
         return limits.reached(asdict(wheel_dimensions(worn[WHEEL]))) if limits else ""
 
-    wearing = Wearing(runs, {WHEEL: load_profile(name)}, {WHEEL: name}, depths, ended)
+    wearing = Wearing(runs, {WHEEL: load_profile(name)}, {WHEEL: name}, depths, end_reason)
     return carry_out(wearing, Loop(**how))
 
 
@@ -159,15 +159,15 @@ class Wearing:
     # a result and a law to the depth of each profile per distance or tonnage
     depths: Callable[[Result, WearLaw], dict[str, Floats]]
     # worn profiles to the sentence why the loop ends; empty while it goes on
-    ended: Callable[[Mapping[str, Profile]], str] = lambda _: ""
+    end_reason: Callable[[Mapping[str, Profile]], str] = lambda _: ""
     outputs: Sequence[str] = ("contact_patches",)  # of the runs
-    given: str = "routes"  # parameter of its runs
+    parameter: str = "routes"  # parameter of its runs
     unit: str = "km"  # of distance or tonnage in messages
     scale: float = 1e-3  # its factor from SI
 
-    def amount(self, at: float) -> str:
+    def amount(self, distance: float) -> str:
         """Return a distance or tonnage as messages give it."""
-        return f"{self.scale * at:.4g} {self.unit}"
+        return f"{self.scale * distance:.4g} {self.unit}"
 
 
 def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
@@ -178,65 +178,65 @@ def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
     settings = settings.model_copy(update={"outputs": settings.outputs.model_copy(update=needed)})
     tell, remark = how.progress or (lambda _: None), how.on_remark or _LOG.warning
     profiles, whole = dict(wearing.new), how.steps * how.step
-    found: list[WearStep] = []
+    steps: list[WearStep] = []
     hunting: set[str] = set()
 
     def finish(at: float, length: float, worn: dict[str, Profile], lost: dict[str, Floats]) -> None:
         mean = {name: depth / length for name, depth in lost.items()}
-        found.append(WearStep(at, length, profiles, worn, mean))
+        steps.append(WearStep(at, length, profiles, worn, mean))
         if how.on_step is not None:
-            how.on_step(found[-1])
+            how.on_step(steps[-1])
 
     for number in range(how.steps):
-        start = at = number * how.step
+        start = distance = number * how.step
         worn, left = profiles, how.step
         lost = {name: np.zeros(1) for name in profiles}
         try:
             while left > 0.0:
                 gc.collect()  # what a run leaves holds the contact table of its profile, 0.1 GB
 
-                def part(done: float, before: float = at, of: float = left) -> None:
-                    tell((before + of * done) / whole)
+                def part(done: float, before: float = distance, remaining: float = left) -> None:
+                    tell((before + remaining * done) / whole)
 
                 path = how.folder and how.folder / _file_name(
                     wearing, settings, how.step, law, worn
                 )
-                if kept := kept_record(path, remark):
-                    depths = {name: np.asarray(depth) for name, depth in kept["depths"].items()}
-                    hunts = kept["hunts"]
+                if stored := stored_record(path, remark):
+                    depths = {name: np.asarray(depth) for name, depth in stored["depths"].items()}
+                    hunts = stored["hunts"]
                 else:
-                    depths, hunts = _wear(wearing, settings, law, worn, at, part)
+                    depths, hunts = _wear(wearing, settings, law, worn, distance, part)
                     if path is not None:
                         lists = {name: depth.tolist() for name, depth in depths.items()}
-                        write_record(path, {"distance": at, "depths": lists, "hunts": hunts})
+                        write_record(path, {"distance": distance, "depths": lists, "hunts": hunts})
                 for route, words in hunts.items():
                     if route not in hunting:
-                        remark(f"after {wearing.amount(at)} on {route}: {words}")
+                        remark(f"after {wearing.amount(distance)} on {route}: {words}")
                 hunting |= hunts.keys()
                 length = left / max(parts_of_step(worn[k], depths[k], left) for k in worn)
                 worn = {k: worn_profile(worn[k], depths[k], length) for k in worn}
                 lost = {k: lost[k] + depths[k] * length for k in worn}
-                at, left = at + length, left - length
-                if why := wearing.ended(worn):
-                    remark(f"after {wearing.amount(at)}: {why}: the loop ends")
-                    finish(start, at - start, worn, lost)
-                    return found
+                distance, left = distance + length, left - length
+                if why := wearing.end_reason(worn):
+                    remark(f"after {wearing.amount(distance)}: {why}: the loop ends")
+                    finish(start, distance - start, worn, lost)
+                    return steps
         except RailsimError:
-            if at > start:
-                finish(start, at - start, worn, lost)
+            if distance > start:
+                finish(start, distance - start, worn, lost)
             raise
         finish(start, how.step, worn, lost)
         tell((number + 1) / how.steps)
         profiles = worn
-    return found
+    return steps
 
 
 def wear_rows(
-    found: Sequence[WearStep], vehicle: Vehicle, track: Track
+    steps: Sequence[WearStep], vehicle: Vehicle, track: Track
 ) -> list[dict[str, float | None]]:
     """Wear after each step.
 
-    `found`: result of `wear_loop`, from its beginning; `vehicle`, `track`: wheelset and rails for
+    `steps`: result of `wear_loop`, from its beginning; `vehicle`, `track`: wheelset and rails for
     the equivalent conicity. Returns: the new wheel, then the wheel after each step: `distance` [m],
     `area` [m2], `deepest` [m] and its position `deepest_y` from the nominal rolling circle [m], all
     since the beginning, `equivalent_conicity` at 3 mm (EN 15302), None if it does not exist, and
@@ -245,7 +245,7 @@ def wear_rows(
     (wheelset, *_) = (body.wheelset for body in flatten(vehicle).bodies if body.wheelset)
     rails = load_profile(track.rail[0]), load_profile(track.rail[1])
     rows = []
-    for distance, worn, lost in since_new(found, WHEEL):
+    for distance, worn, lost in since_new(steps, WHEEL):
         (conicity,) = contact_geometry(
             worn, rails, wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
         ).equivalent_conicity([AMPLITUDE])
@@ -257,40 +257,40 @@ def wear_rows(
     return rows
 
 
-def since_new(found: Sequence[WearStep], name: str) -> list[tuple[float, Profile, Floats]]:
+def since_new(steps: Sequence[WearStep], name: str) -> list[tuple[float, Profile, Floats]]:
     """Return distance, profile and its loss in z since it was new: at first, after each step."""
-    if not found:
+    if not steps:
         return []
-    new = found[0].profiles[name]
-    wheels = [(0.0, new), *((s.distance + s.length, s.worn_profiles[name]) for s in found)]
+    new = steps[0].profiles[name]
+    wheels = [(0.0, new), *((s.distance + s.length, s.worn_profiles[name]) for s in steps)]
     return [(at, worn, np.abs(np.asarray(new.z) - np.asarray(worn.z))) for at, worn in wheels]
 
 
 def row(distance: float, worn: Profile, lost: Floats) -> dict[str, float | None]:
     """Worn area, largest depth and where it is, None where nothing is worn."""
-    at = int(np.argmax(lost))
+    deepest = int(np.argmax(lost))
     return {
         "distance": distance,
         "area": float(np.trapezoid(lost, worn.y)),
-        "deepest": float(lost[at]),
-        "deepest_y": float(worn.y[at]) if lost[at] else None,
+        "deepest": float(lost[deepest]),
+        "deepest_y": float(worn.y[deepest]) if lost[deepest] else None,
     }
 
 
 def _check(wearing: Wearing, how: Loop) -> None:
-    faults, what = Faults(), wearing.given
-    option = f"--{what.removesuffix('s')}"
-    faults.require(wearing.runs, what, "none", "at least one", option)
+    faults, parameter = Faults(), wearing.parameter
+    option = f"--{parameter.removesuffix('s')}"
+    faults.require(wearing.runs, parameter, "none", "at least one", option)
     low, high = SPEED_RANGE
     for run in wearing.runs:
-        on = f"for {run.vehicle.name} on {run.track.name}"
-        found, allowed = f"found {run.speed:.12g} m/s {on}", f"{low:g} to {high:g} m/s"
-        faults.require(low <= run.speed <= high, what, found, allowed, option)
-        right = run.share > 0.0 and math.isfinite(run.share)
-        found = f"found a share of {run.share:.12g} {on}"
-        faults.require(right, what, found, "above 0", option)
-    right = how.step > 0.0 and math.isfinite(how.step)
-    faults.require(right, "step", f"found {wearing.amount(how.step)}", "above 0")
+        where = f"for {run.vehicle.name} on {run.track.name}"
+        found, allowed = f"found {run.speed:.12g} m/s {where}", f"{low:g} to {high:g} m/s"
+        faults.require(low <= run.speed <= high, parameter, found, allowed, option)
+        valid = run.share > 0.0 and math.isfinite(run.share)
+        found = f"found a share of {run.share:.12g} {where}"
+        faults.require(valid, parameter, found, "above 0", option)
+    valid = how.step > 0.0 and math.isfinite(how.step)
+    faults.require(valid, "step", f"found {wearing.amount(how.step)}", "above 0")
     with faults.caught():
         wear_law(how.law)
     faults.require(how.steps >= 1, "steps", f"found {how.steps}", "1 or more")
@@ -322,7 +322,7 @@ def _wear(
     settings: Settings,
     law: WearLaw,
     worn: Mapping[str, Profile],
-    at: float,
+    distance: float,
     progress: Progress,
 ) -> tuple[dict[str, Floats], dict[str, str]]:
     """Depth of wear per distance or tonnage, mean of the runs weighted by their shares.
@@ -338,7 +338,7 @@ def _wear(
         def part(done: float, before: int = number) -> None:
             progress((before + done) / len(wearing.runs))
 
-        of = f", {run.vehicle.name}" if several else ""
+        of_vehicle = f", {run.vehicle.name}" if several else ""
         known = {rail: load_profile(rail) for rail in run.track.rail if rail not in worn_profiles}
         known |= worn_profiles
         try:
@@ -350,13 +350,13 @@ def _wear(
                 raise ModelError(f"{result.status}, {result.attributes['status_reason']}")
             of_run = wearing.depths(result, law)
             depths.append({k: run.share / total * depth for k, depth in of_run.items()})
-            words = _hunting(result) or _hunting_when_disturbed(run, settings, known)
+            hunting = _hunting(result) or _hunting_when_disturbed(run, settings, known)
         except ModelError as error:
             names = ", ".join(profile.name for profile in worn.values())
-            place = f"{names} after {wearing.amount(at)} on {run.track.name}{of}"
+            place = f"{names} after {wearing.amount(distance)} on {run.track.name}{of_vehicle}"
             raise ModelError(f"{place}: {error}") from None
-        if words:
-            hunts[f"{run.track.name} at {run.speed:g} m/s{of}"] = words
+        if hunting:
+            hunts[f"{run.track.name} at {run.speed:g} m/s{of_vehicle}"] = hunting
     return ({k: np.asarray(np.sum([d[k] for d in depths], axis=0)) for k in worn}, hunts)
 
 

@@ -32,7 +32,7 @@ from railsim.notation import PATCHES, REQUESTED
 from railsim.plot.assessment import assessment_figure, sections_figure
 from railsim.profiles import load_profile
 from railsim.result import Result
-from railsim.studies.analyses import analysed
+from railsim.studies.analyses import numbers_and_remarks
 from railsim.studies.journal import Journal
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
@@ -978,7 +978,7 @@ def test_in_a_study_the_largest_value_of_a_section_is_a_number():
     (found,) = assess(run)
     asked = {"own": AssessAnalysis(kind="assess")}
     case = SimpleNamespace(analyses=asked, settings=run.settings(), speed=20.0)
-    numbers, _ = analysed(case, run)
+    numbers, _ = numbers_and_remarks(case, run)
     last = max(s.section.end for s in found.sections if s.counts) - 35.0
     assert numbers["own.Y_qst_largest"] == pytest.approx(10e3 + 50.0 * last, abs=5.0)
     assert unit_of_number("own.Y_qst_largest") == "N"
@@ -990,11 +990,11 @@ def test_in_a_study_a_run_that_ended_before_its_assessment_is_no_failure(standar
     asked = {"own": AssessAnalysis(kind="assess", standard=standard)}
     case = SimpleNamespace(analyses=asked)
     short = example_result(duration=2.0, rate=100.0, status="derailed")
-    numbers, (remark,) = analysed(case, short)
+    numbers, (remark,) = numbers_and_remarks(case, short)
     assert not numbers
     assert remark.startswith("own: not assessed: run: time: ")
     with pytest.raises(InputError, match="time: "):
-        analysed(case, example_result(duration=2.0, rate=100.0))
+        numbers_and_remarks(case, example_result(duration=2.0, rate=100.0))
 
 
 @pytest.mark.parametrize("instant", [40.0, 63.0])

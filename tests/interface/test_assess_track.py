@@ -17,7 +17,7 @@ from railsim.cli import main
 from railsim.plot.study import heat_strip
 from railsim.plot.style import LIMIT
 from railsim.studies import assess_track as module
-from railsim.studies.assess_track import assess_track, recorded
+from railsim.studies.assess_track import assess_track, load_recorded_track
 from railsim.studies.case import Case
 from railsim.studies.geometry_limits import CELL, GEOMETRY, RecordedGeometry
 from railsim.track.irregularity import displacement
@@ -224,7 +224,7 @@ def test_vehicles_that_hunt_are_said():
     labels = {"vehicle": "wagon", "speed": 40.0}
     other = {"labels": {"vehicle": "coach", "speed": 40.0}, "hunts": False}
     failed = {"labels": labels, "status": "failed"}
-    (words,) = module._hunting([{"labels": labels, "hunts": True}, failed, other])
+    (words,) = module._hunting_remarks([{"labels": labels, "hunts": True}, failed, other])
     assert words.startswith("wagon hunts at 144 km/h in 1 of 2 pieces")
 
 
@@ -263,7 +263,7 @@ def test_wrong_input(recording, tmp_path, capsys):
     )
     assert "wheelsets alone" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
-    assert recorded(recording).length == pytest.approx(LENGTH - 0.25)
+    assert load_recorded_track(recording).length == pytest.approx(LENGTH - 0.25)
 
 
 def test_speed_out_of_range_is_told_at_its_option(recording, tmp_path, capsys):
@@ -294,7 +294,7 @@ def test_vehicles_of_one_name_are_told_before_any_run(recording, tmp_path, capsy
 )
 def test_pieces_keep_what_a_straight_track_has_at_its_places(recording, changes):
     """Only a track that is the same everywhere is cut; cant and friction are not lost or moved."""
-    track = recorded(recording)
+    track = load_recorded_track(recording)
     assert module._part(track, 500.0, 900.0)[1] == 240.0
     part, moved = module._part(track.replace(**changes), 500.0, 900.0)
     assert moved == 0.0
@@ -368,7 +368,7 @@ class _Lifting:
 
 @pytest.fixture
 def pieces(judged):
-    """Runs of `judged` as `_judged` takes them."""
+    """Runs of `judged` as `_assessment` takes them."""
     runs = []
     for number, a in enumerate((0.0, 499.875)):
         result = railsim.open_result(judged[2] / f"coach_manchester_40_{number:04d}.h5")
@@ -401,7 +401,7 @@ def test_a_wheel_that_lifts_is_flagged_and_spoils_no_other_place(
         return _Lifting(opened(path), gap) if path.name.endswith("_0000.h5") else opened(path)
 
     monkeypatch.setattr(module, "open_result", spoilt)
-    found = module._judged(recorded(recording), runs, 0.6, outcome, [])
+    found = module._assessment(load_recorded_track(recording), runs, 0.6, outcome, [])
     s = float(lifting["wheelset_distance"][gap.start, 2])
     (section,) = (r for r in found.sections.records() if r["begin"] <= s < r["end"])
     assert section["vehicles"] == "flagged"
@@ -415,8 +415,8 @@ def test_what_one_vehicle_exceeds_counts_where_another_never_ran(judged, recordi
     runs, outcome = pieces
     labels = {"vehicle": "other", "speed": SPEED}
     never = [run._replace(case=replace(run.case, name="none", labels=labels)) for run in runs]
-    alone = module._judged(recorded(recording), runs, 0.6, outcome, [])
-    both = module._judged(recorded(recording), [*runs, *never], 0.6, outcome, [])
+    alone = module._assessment(load_recorded_track(recording), runs, 0.6, outcome, [])
+    both = module._assessment(load_recorded_track(recording), [*runs, *never], 0.6, outcome, [])
     shown = [[row["vehicles"] for row in one.sections.records()] for one in (alone, both)]
     assert "flagged" in shown[0]
     assert shown[1] == [words or "not run" for words in shown[0]]
@@ -424,11 +424,11 @@ def test_what_one_vehicle_exceeds_counts_where_another_never_ran(judged, recordi
 
 def test_places_have_the_mileage_of_the_track(recording, pieces):
     """Km 34 at s = 0, falling: the defect at 640 m is at km 33.360."""
-    track = recorded(recording).replace(mileage=34_000.0, falling_mileage=True)
-    found = module._judged(track, *pieces[:1], 0.6, pieces[1], [])
+    track = load_recorded_track(recording).replace(mileage=34_000.0, falling_mileage=True)
+    found = module._assessment(track, *pieces[:1], 0.6, pieces[1], [])
     assert found.table().records()[0]["mileage"] == pytest.approx(34_000.0 - found.places[0].s)
     assert abs(found.places[0].mileage - (34_000.0 - DEFECT)) < 40.0
-    plain = module._judged(recorded(recording), *pieces[:1], 0.6, pieces[1], [])
+    plain = module._assessment(load_recorded_track(recording), *pieces[:1], 0.6, pieces[1], [])
     assert "mileage" not in plain.table().records()[0]
     (own,) = (one.model_dump(exclude_none=True) for one in track.irregularities)
     track = track.replace(irregularities=[{**own, "mileage": 34_000.0}])

@@ -290,11 +290,11 @@ def test_files_without_an_option_are_not_called_by_one(given, words, tmp_path, m
     ("work", "given", "words"),
     [
         (
-            "studies.stability_map._computed",
+            "studies.stability_map._compute",
             f"critical-speed {MAP} --method all --points 0",
             "--points: found 0",
         ),
-        ("studies.stability_map._computed", f"critical-speed {MAP},9", "--conicity: found 9"),
+        ("studies.stability_map._compute", f"critical-speed {MAP},9", "--conicity: found 9"),
         ("linear.modes.parameter_locus", f"modes {MASSES}", "--over: bodies.carbody.mass: -1"),
         ("identification.fit.Problem", f"identify {RUN} -p x", "--parameters: x: no value 'x'"),
         ("contact.summary.contact_summary", "contact --gauges 1.4,9", "--gauges: found 9; 0.3 to"),

@@ -26,10 +26,10 @@ from railsim.profiles import load_profile
 from railsim.studies.campaign import (
     campaign,
     counting_sections,
-    fitted_curves,
     left_out,
     part_speed,
     scenario_cases,
+    with_fitted_curves,
 )
 
 
@@ -175,7 +175,7 @@ def test_slow_vehicle_is_tested_in_every_zone_and_not_faster_than_it_may_run(veh
         speed = part_speed(part.speed, service)
         assert speed <= 1.1 * service.admissible_speed + 1e-9
         drawn = railsim.load_track(part.track)
-        track = fitted_curves(drawn, part.speed, service, limits)
+        track = with_fitted_curves(drawn, part.speed, service, limits)
         found = track_sections(track, limits, service, (100.0, track.length), lambda _, v=speed: v)
         counted = [one for one in found if not one.reason]
         assert {one.zone for one in counted} == {str(number)}

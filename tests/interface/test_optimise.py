@@ -465,7 +465,7 @@ def test_a_sign_that_is_a_direction_is_said_to_count(tmp_path, monkeypatch, aske
     outcome = SimpleNamespace(records=records, computed=2)
     monkeypatch.setattr(DESIGNS, "run_study", lambda *_: outcome)
     monkeypatch.setattr(DESIGNS, "summary_row", lambda record: record)
-    monkeypatch.setattr(DESIGNS, "_written", lambda *_: "1")
+    monkeypatch.setattr(DESIGNS, "_written_value", lambda *_: "1")
     remarks = []
     evaluation = Evaluation(study, study.optimise, tmp_path, Execution(on_remark=remarks.append))
     for _ in range(2):  # once, not for each batch

@@ -20,7 +20,7 @@ from railsim.definitions.study.definition import Sample, Spread
 from railsim.errors import InputError, input_error
 from railsim.studies import execute, user_function
 from railsim.studies.plan import Plan
-from railsim.studies.rows import made_rows, quantile, sampled
+from railsim.studies.rows import combined_rows, draw_sample, quantile
 from railsim.studies.spec import Execution, StudySpec
 from railsim.studies.study import run_study
 from railsim.units import range_values
@@ -254,16 +254,16 @@ def test_speeds_and_grid_take_units_and_ranges(tmp_path, simulated):
 def test_latin_hypercube_has_one_value_in_each_part_of_each_parameter():
     spreads = {"a": Spread(low=0.0, high=8.0), "b": Spread(low=1.0, high=256.0, scale="log")}
     sample = Sample(number=8, seed=3, parameters=spreads)
-    drawn = sampled(sample)
+    drawn = draw_sample(sample)
     assert sorted(int(float(row["a"])) for row in drawn) == list(range(8))
     assert sorted(int(np.log2(float(row["b"]))) for row in drawn) == list(range(8))
-    assert sampled(sample) == drawn
-    assert sampled(Sample(number=8, seed=4, parameters=spreads)) != drawn
+    assert draw_sample(sample) == drawn
+    assert draw_sample(Sample(number=8, seed=4, parameters=spreads)) != drawn
 
 
 def test_sobol_sample_is_balanced_and_normal_spread_is_normal():
     sample = Sample(method="sobol", number=64, parameters={"a": Spread(mean=5.0, deviation=2.0)})
-    values = np.array([float(row["a"]) for row in sampled(sample)])
+    values = np.array([float(row["a"]) for row in draw_sample(sample)])
     # half of a balanced sequence lies on each side, 68 % within a standard deviation
     assert (values < 5.0).sum() == 32
     assert abs((np.abs(values - 5.0) < 2.0).mean() - 0.6827) < 1.0 / 32.0
@@ -272,7 +272,7 @@ def test_sobol_sample_is_balanced_and_normal_spread_is_normal():
 
 def test_grid_is_outermost_then_links_then_the_sample():
     sample = Sample(number=2, parameters={"c": Spread(low=0.0, high=1.0)})
-    made = made_rows({"a": ["1", "2"]}, [{"b": ["3", "4"], "speed": ["5", "6"]}], sample)
+    made = combined_rows({"a": ["1", "2"]}, [{"b": ["3", "4"], "speed": ["5", "6"]}], sample)
     assert [(row.values["a"], row.values["b"], row.speed) for row in made] == [
         (a, b, v) for a in "12" for b, v in (("3", 5.0), ("4", 6.0)) for _ in range(2)
     ]
@@ -336,7 +336,7 @@ def test_own_quantities_stand_in_record_and_summary_and_follow_their_file(tmp_pa
     result = railsim.open_result(out / f"{COACH}_{CURVE}_10.h5")
     assert float(rows(out)[0]["twice"]) == 2.0 * result.Q.max()
     file.write_text("def mine(result):\n    return {'thrice': 3.0 * result.Q.max()}\n")
-    user_function._loaded.cache_clear()  # another process would load it anew
+    user_function._load.cache_clear()  # another process would load it anew
     assert main(arguments(out, 10, more=more)) == 0
     assert float(rows(out)[0]["thrice"]) == 3.0 * result.Q.max()
     assert simulated == [10.0]  # the run itself is kept
@@ -356,7 +356,7 @@ def test_function_that_a_received_study_names_is_not_loaded(
     shutil.copy(tmp_path / "q.py", received)
     if not computed:
         (received / f"{COACH}_{CURVE}_10.h5").unlink()
-    user_function._loaded.cache_clear()
+    user_function._load.cache_clear()
     monkeypatch.chdir(mine)
     before = sorted(path.stat().st_mtime_ns for path in received.iterdir())
     resume = ["study", "--resume", "--out", str(received), "--workers", "1"]

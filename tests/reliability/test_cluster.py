@@ -9,7 +9,7 @@ import pytest
 import railsim
 from railsim.result import open_run
 from railsim.studies.case import load_case
-from railsim.studies.execute import Job, compile_on_cluster, perform_there
+from railsim.studies.execute import Job, compile_on_cluster, perform_remotely
 from railsim.studies.spec import RunSpec
 
 distributed = pytest.importorskip("distributed")
@@ -29,7 +29,7 @@ def arrays(folder):
 def test_job_whose_folder_is_not_seen_sends_its_files_back(tmp_path):
     case = load_case(RunSpec("coach_manchester", "straight", 20.0, until=10.0))
     job = Job(case, *(tmp_path / "elsewhere" / name for name in (case.file_name, "a.png")))
-    record, files = perform_there(job, "nobody made this mark")
+    record, files = perform_remotely(job, "nobody made this mark")
     assert record["status"] == "complete"
     assert set(files) == {case.file_name, "a.png"}
     assert files["a.png"].startswith(b"\x89PNG")

@@ -10,7 +10,7 @@ from railsim.definitions.excitations.random import Random
 from railsim.definitions.loading import load_running_limits
 from railsim.definitions.track.elements import CantRamp, ConstantCant
 from railsim.studies import campaign
-from railsim.studies.campaign import _lowered, counting_sections, part_speed, repeated
+from railsim.studies.campaign import _lowered, counting_sections, part_speed, repetitions
 from railsim.studies.case import Case
 
 LIMITS = load_running_limits("en14363")
@@ -84,7 +84,7 @@ def test_a_run_has_as_many_seeds_as_its_zone_needs_sections(
     fields = {name: None for name in Case.__dataclass_fields__}
     for name, value in (fields | {"name": "r", "track": track, "labels": {"a": 1}}).items():
         object.__setattr__(case, name, value)
-    found = repeated(case, LIMITS, None, condition)
+    found = repetitions(case, LIMITS, None, condition)
     seeds = [7 + 10 * (20 * condition + k) for k in range(runs)]
     assert [one.name for one in found] == [f"r_seed{seed}" for seed in seeds]
     assert [one.labels for one in found] == [{"a": 1, "seed": seed} for seed in seeds]
@@ -95,7 +95,7 @@ def test_a_run_has_as_many_seeds_as_its_zone_needs_sections(
 @pytest.mark.parametrize("parts", [(), (SimpleNamespace(seed=1),), (Random.model_construct(),) * 2])
 def test_runs_on_other_tracks_than_one_random_one_are_not_repeated(parts):
     case = SimpleNamespace(track=SimpleNamespace(irregularities=parts))
-    assert repeated(case, LIMITS, None, 0) == [case]
+    assert repetitions(case, LIMITS, None, 0) == [case]
 
 
 @pytest.mark.parametrize(

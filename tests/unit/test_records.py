@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from railsim.studies.records import kept_record, write_record
+from railsim.studies.records import stored_record, write_record
 from railsim.studies.summary import _write_rows, summary_row, unit_of
 
 RECORD = {"speed": 61.7, "modes": [1.0, None, "hunting"], "nested": {"b": 2, "a": 1e-300}}
@@ -21,7 +21,7 @@ def kept(tmp_path):
 
 
 def test_record_comes_back_as_it_was(kept):
-    assert kept_record(kept, pytest.fail) == RECORD
+    assert stored_record(kept, pytest.fail) == RECORD
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_record_comes_back_as_it_was(kept):
 def test_anything_else_is_refused(kept, damage):
     kept.write_bytes(damage(kept.read_bytes()))
     said = []
-    assert kept_record(kept, said.append) is None
+    assert stored_record(kept, said.append) is None
     assert re.fullmatch(r".*one\.json: .*: it is computed again", *said)
     assert not kept.exists()
 
@@ -52,7 +52,7 @@ def test_any_changed_byte_is_noticed_or_means_the_same(kept):
     for i in range(len(whole)):
         kept.write_bytes(whole[:i] + bytes([whole[i] ^ 1]) + whole[i + 1 :])
         said = []
-        found = kept_record(kept, said.append)
+        found = stored_record(kept, said.append)
         assert found == RECORD if found is not None else said
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from railsim.definitions.study.analyses import CriticalSpeedAnalysis
-from railsim.studies.analyses import analysed
+from railsim.studies.analyses import numbers_and_remarks
 from railsim.studies.case import Loader
 from railsim.studies.spec import RunSpec
 
@@ -60,6 +60,6 @@ def test_where_there_is_no_critical_speed_the_end_of_the_range_stands_for_it(
     asked = CriticalSpeedAnalysis(kind="critical_speed", low=10.0, high=90.0)
     case = SimpleNamespace(vehicle=None, track=None, settings=None, analyses={"own": asked})
     expected = expected | {"ramp": 90.0, "bifurcation": 33.0}
-    numbers, remarks = analysed(case, None)
+    numbers, remarks = numbers_and_remarks(case, None)
     assert numbers == {f"own.{name}": value for name, value in expected.items()}
     assert remarks == ["own: a remark"]
