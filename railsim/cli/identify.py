@@ -69,7 +69,7 @@ def command(
         from railsim.report import measured as report
 
         figures = report.identification_figures(found)
-        part = report.of_identification(found.record(), report.drawn(figures))
+        part = report.identification_part(found.record(), report.as_drawings(figures))
         pictures = figures["fits"], figures["residuals"]
         content = found.record(), report.measured_page([part]), *pictures
         output.write_all(dict(zip(FILES[1:], content, strict=True)))

@@ -64,7 +64,7 @@ def command(
 
     mechanisms = [load_mechanism(file, assignments) for file in files]
     if output.out is not None:
-        from railsim.report.mechanisms import NAMES, Collected
+        from railsim.report.mechanisms import NAMES, PageResults
         from railsim.report.mechanisms import files as written
 
         others = (f"drawing_{number}.png" for number in range(2, len(files) + 1))
@@ -87,7 +87,7 @@ def command(
                 cases = {name: _of_case(mechanism, name) for name in mechanism.cases}
                 cases = {"base": results[0], **cases}
     if output.out is not None:
-        content = written(Collected(results, cases, optimum))
+        content = written(PageResults(results, cases, optimum))
         if optimum is not None:
             from railsim.mechanisms.optimum import optimised_text
 

@@ -13,7 +13,7 @@ from railsim.files.access import folder_of, write_text
 
 if TYPE_CHECKING:
     from railsim.assessment import Assessment
-    from railsim.report.inputs import Used
+    from railsim.report.inputs import Inputs
 
 ENDINGS = (".html", ".htm")
 
@@ -77,12 +77,12 @@ def write_report(
     write_text(path, page(title or names, *runs, assessments, measured))
 
 
-def used_inputs(folder: Path) -> "list[Used]":
+def used_inputs(folder: Path) -> "list[Inputs]":
     """Inputs of a study without results: the first run of each vehicle on each track.
 
     From the files as they are now; nothing where they are gone or no longer what they were.
     """
-    from railsim.report.inputs import Used
+    from railsim.report.inputs import Inputs
     from railsim.studies.plan import Plan
     from railsim.studies.study import stored_spec
 
@@ -97,5 +97,5 @@ def used_inputs(folder: Path) -> "list[Used]":
     found = []
     for case in cases:
         names = str(case.labels["vehicle"]), str(case.labels["track"])
-        found.append(Used(*names, case.vehicle, case.track, case.settings, case.speed))
+        found.append(Inputs(*names, case.vehicle, case.track, case.settings, case.speed))
     return found

@@ -48,9 +48,9 @@ def command(
     results = _results(names, runs, [f for f in files if f not in names], vehicle)
     found = validate_model(runs, results, limits=wanted)
     if output.folder:
-        from railsim.report.measured import measured_page, of_validation, validation_figures
+        from railsim.report.measured import measured_page, validation_figures, validation_part
 
-        figures, page = validation_figures(found), measured_page([of_validation(found)])
+        figures, page = validation_figures(found), measured_page([validation_part(found)])
         pictures = figures["scatter"], figures["overlays"]
         content = found.record(), found.section_table(), page, *pictures
         for name, one in zip(FILES, content, strict=True):

@@ -28,14 +28,14 @@ STANDS_STILL = 1.0  # m; below it the time is the horizontal axis
 
 def groups(results: Results) -> list[dict[str, Result]]:
     """Group results, by the names of their runs, by alignment; omit runs without instants."""
-    found: dict[tuple[Any, ...], dict[str, Result]] = {}
+    by_alignment: dict[tuple[Any, ...], dict[str, Result]] = {}
     for name, result in results.items():
         if len(result["time"]) < 2:
             continue
         track = result.track()
         plan = ((s.type, s.begin, s.end, s.start_value) for s in curvature_sections(track))
-        found.setdefault((track.name, *plan), {})[name] = result
-    return list(found.values())
+        by_alignment.setdefault((track.name, *plan), {})[name] = result
+    return list(by_alignment.values())
 
 
 def curve_data(results: Results, cells: int = CELLS) -> dict[str, Any]:
@@ -91,7 +91,7 @@ def _quantity(
             count = array.shape[1]
             values[row, :count] = thin.T.reshape(count, sides, -1)
     values *= quantity.scale
-    low, high, codes = coded(values)
+    low, high, codes = encode(values)
     limit = limit_of(name, results.values())
     return {
         "name": name, "words": quantity.long_name[:1].upper() + quantity.long_name[1:],
@@ -135,19 +135,19 @@ def thinned(axis: Floats, values: Floats, edges: Floats) -> Floats:
     return found
 
 
-def coded(values: Floats) -> tuple[float, float, str]:
+def encode(values: Floats) -> tuple[float, float, str]:
     """Return smallest and largest value, and all values as 16-bit integers between, in base64."""
-    there = np.isfinite(values)
-    low = float(values[there].min()) if there.any() else 0.0
-    high = float(values[there].max()) if there.any() else 0.0
+    finite = np.isfinite(values)
+    low = float(values[finite].min()) if finite.any() else 0.0
+    high = float(values[finite].max()) if finite.any() else 0.0
     step = (high - low) / (MISSING - 1) or 1.0
     codes = np.full(values.shape, MISSING, dtype="<u2")
-    codes[there] = np.rint((values[there] - low) / step).astype("<u2")
+    codes[finite] = np.rint((values[finite] - low) / step).astype("<u2")
     return low, high, b64encode(codes.tobytes()).decode()
 
 
-def cells_of(found: Sequence[Results]) -> int:
+def cells_of(grouped: Sequence[Results]) -> int:
     """Return the number of cells of all curves for which the page stays small."""
-    each = ([len(result.wheelsets) for result in results.values()] for results in found)
+    each = ([len(result.wheelsets) for result in results.values()] for results in grouped)
     lines = 9 * sum(len(numbers) * max(numbers) for numbers in each)
     return max(50, min(CELLS, MOST_VALUES // max(1, 2 * lines)))

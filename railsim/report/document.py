@@ -63,7 +63,7 @@ class Section:
     details: list[Table] = field(default_factory=list)  # tables that are folded at first
 
 
-def of_values(table: values.Table, subject: str) -> Table:
+def page_table(table: values.Table, subject: str) -> Table:
     """Return a table of values for the page; its caption begins with its subject."""
     return Table(
         [column.heading for column in table.columns],
@@ -73,16 +73,16 @@ def of_values(table: values.Table, subject: str) -> Table:
     )
 
 
-def day(created: str) -> str:
+def day(time: str) -> str:
     """A time of ISO 8601 in words.
 
     >>> day("2026-11-03T15:04:20+00:00"), day("earlier")
     ('3 November 2026, 15:04', 'earlier')
     """
     try:
-        when = datetime.fromisoformat(created)
+        when = datetime.fromisoformat(time)
     except ValueError:
-        return created
+        return time
     return f"{when.day} {month_name[when.month]} {when.year}, {when:%H:%M}"
 
 
@@ -99,17 +99,17 @@ def as_png(figure: Figure) -> bytes:
 
 
 def pictures(
-    drawn: Mapping[str, bytes], captions: Mapping[str, str], names: Iterable[str] | None = None
+    images: Mapping[str, bytes], captions: Mapping[str, str], names: Iterable[str] | None = None
 ) -> list[Drawing]:
     """Return those of some pictures that were drawn, by default all, with their captions."""
-    found = []
-    for name in drawn if names is None else names:
-        if name in drawn:
-            width = int.from_bytes(drawn[name][16:20], "big")  # the header of a PNG file
+    drawings = []
+    for name in images if names is None else names:
+        if name in images:
+            width = int.from_bytes(images[name][16:20], "big")  # the header of a PNG file
             caption = captions[name.rstrip("_0123456789")]
-            image = IMAGE.format(caption, round(width * 96 / DPI), b64encode(drawn[name]).decode())
-            found.append(Drawing("", caption, image))
-    return found
+            image = IMAGE.format(caption, round(width * 96 / DPI), b64encode(images[name]).decode())
+            drawings.append(Drawing("", caption, image))
+    return drawings
 
 
 def document(
@@ -128,7 +128,7 @@ def document(
     )  # fmt: skip
 
 
-def of_design(
+def design_page(
     title: str,
     source: str | None,
     checks: Sequence[Check],

@@ -16,7 +16,7 @@ from railsim.description.rest import rest_frequencies
 from railsim.errors import InputError, ModelError
 from railsim.model.statics import static_loads
 from railsim.profiles import Profile
-from railsim.report.document import Drawing, Section, Table, of_values
+from railsim.report.document import Drawing, Section, Table, page_table
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
 from railsim.report.spread import number
 from railsim.result import Results
@@ -32,7 +32,7 @@ MOST_VALUES = 3  # of an assumption in runs of one vehicle on one track
 MOST_DIFFERENCES = 40  # keys in which the vehicles differ
 
 
-class Used(NamedTuple):
+class Inputs(NamedTuple):
     """Inputs of a run, with the labels of the study: two files may hold vehicles of one name."""
 
     vehicle_label: str
@@ -43,35 +43,35 @@ class Used(NamedTuple):
     speed: float
 
 
-def inputs_of(records: Sequence[Record], results: Results) -> list[Used]:
+def inputs_of(records: Sequence[Record], results: Results) -> list[Inputs]:
     """Return the inputs of results."""
     labels = {record["name"]: record["labels"] for record in records}
-    found = []
+    run_inputs = []
     for name, result in results.items():
-        own, vehicle, track = labels.get(name, {}), result.vehicle(), result.track()
-        names = str(own.get("vehicle", vehicle.name)), str(own.get("track", track.name))
-        found.append(Used(*names, vehicle, track, result.settings(), result.speed))
-    return found
+        texts, vehicle, track = labels.get(name, {}), result.vehicle(), result.track()
+        names = (str(texts.get("vehicle", vehicle.name)), str(texts.get("track", track.name)))
+        run_inputs.append(Inputs(*names, vehicle, track, result.settings(), result.speed))
+    return run_inputs
 
 
-def units_of(records: Sequence[Record], used: Sequence[Used]) -> dict[str, str]:
+def units_of(records: Sequence[Record], runs: Sequence[Inputs]) -> dict[str, str]:
     """Return the units of what was varied, by the labels of the runs."""
     keys = dict.fromkeys(label for record in records for label in record["labels"] if "." in label)
-    return {key: next(filter(None, (unit_of_input(one, key) for one in used)), "") for key in keys}
+    return {key: next(filter(None, (unit_of_input(one, key) for one in runs)), "") for key in keys}
 
 
-def _assumed(used: Sequence[Used], whole: str) -> Table:
+def _assumed(runs: Sequence[Inputs], whole: str) -> Table:
     """Return the assumptions of runs; those that are the same in all, once, under `whole`."""
-    found: dict[str, dict[str, dict[str, None]]] = {}
-    for one in used:
-        own = found.setdefault(f"{one.vehicle_label} on {one.track_label}", {})
+    columns: dict[str, dict[str, dict[str, None]]] = {}
+    for one in runs:
+        own = columns.setdefault(f"{one.vehicle_label} on {one.track_label}", {})
         for line in assumptions(one.vehicle, one.track, one.settings, one.speed)[1:]:
             key, words = line.split(None, 1)
             own.setdefault(key, {})[words] = None
-    if all(own == next(iter(found.values())) for own in found.values()):
-        found = {whole: next(iter(found.values()))}
-    keys = dict.fromkeys(key for own in found.values() for key in own)
-    shown, more = dict(list(found.items())[:MOST_ASSUMED]), len(found) - MOST_ASSUMED
+    if all(own == next(iter(columns.values())) for own in columns.values()):
+        columns = {whole: next(iter(columns.values()))}
+    keys = dict.fromkeys(key for own in columns.values() for key in own)
+    shown, more = dict(list(columns.items())[:MOST_ASSUMED]), len(columns) - MOST_ASSUMED
     rows = [[key, *(_either(list(own.get(key, ()))) for own in shown.values())] for key in keys]
     header, note = ["", *map(printable, shown)], f"{more} more vehicles on tracks." * (more > 0)
     return Table(header, rows, "Assumptions", range(len(shown) + 1), note=note)
@@ -82,21 +82,21 @@ def _either(values: Sequence[str]) -> str:
     return "; or ".join(values[:MOST_VALUES]) + (f"; and {more} more" if more > 0 else "")
 
 
-def what_was_run(used: Sequence[Used], results: Results, inputs: Mapping[str, Any]) -> Section:
+def inputs_section(runs: Sequence[Inputs], results: Results, inputs: Mapping[str, Any]) -> Section:
     """Return the section of the page about vehicles, tracks, inputs and settings."""
     section = Section("Inputs", id="inputs")
     vehicles: dict[str, Any] = {}
     tracks: dict[str, list[Track]] = {}
-    for one in used:
-        vehicles.setdefault(one.vehicle_label, one.vehicle)
-        tracks.setdefault(one.track_label, []).append(one.track)
-    if used and not results:
+    for run in runs:
+        vehicles.setdefault(run.vehicle_label, run.vehicle)
+        tracks.setdefault(run.track_label, []).append(run.track)
+    if runs and not results:
         section.texts.append(
             "Vehicles and tracks as their files are now, with the values of the first run of each "
             "vehicle on each track; there are no files of results."
         )
     for name, vehicle in vehicles.items():
-        words = f"{_named(vehicle, name)}{vehicle.source or ''}"
+        words = f"{_name_beside(vehicle, name)}{vehicle.source or ''}"
         kinds = [kind.replace("_", " ") for kind in element_kinds(vehicle)]
         section.drawings.append(Drawing(name, words, Markup(vehicle_svg(vehicle)), kinds))
     for name, variants in tracks.items():
@@ -104,7 +104,7 @@ def what_was_run(used: Sequence[Used], results: Results, inputs: Mapping[str, An
         rails = ", ".join(one if one == "rigid" else f"elastic ({one})" for one in presets)
         friction = ", ".join(dict.fromkeys(track.friction_words for track in variants))
         unusual = dict.fromkeys(str(one) for track in variants for one in track_remarks(track))
-        words = f"{_named(variants[0], name)}Friction {friction}; rails {rails}."
+        words = f"{_name_beside(variants[0], name)}Friction {friction}; rails {rails}."
         words += f" Remarks: {'; '.join(unusual)}." if unusual else ""
         section.drawings.append(Drawing(name, words, Markup(track_svg(variants[0]))))
     section.details += _at_rest(results)
@@ -112,16 +112,16 @@ def what_was_run(used: Sequence[Used], results: Results, inputs: Mapping[str, An
         section.tables.append(_differences(vehicles))
     if inputs:
         section.tables.append(_inputs(inputs))
-    if used:
-        section.tables.append(_assumed(used, "all runs" if results or not inputs else "first runs"))
+    if runs:
+        section.tables.append(_assumed(runs, "all runs" if results or not inputs else "first runs"))
     if results:
         section.tables.append(_settings(results))
     return section
 
 
-def _named(one: Vehicle | Track, label: str) -> str:
+def _name_beside(definition: Vehicle | Track, label: str) -> str:
     """Return the name of a file's content where its label does not say it."""
-    return "" if one.name == label else f"{one.name}. "
+    return "" if definition.name == label else f"{definition.name}. "
 
 
 def _at_rest(results: Results) -> list[Table]:
@@ -130,16 +130,16 @@ def _at_rest(results: Results) -> list[Table]:
     for result in results.values():
         if len(vehicles) == MOST_AT_REST:
             break
-        if all(result.vehicle() != known for known, _ in vehicles):
+        if all(result.vehicle() != other for other, _ in vehicles):
             vehicles.append((result.vehicle(), result.profiles))
-    found = []
+    rest_tables = []
     for vehicle, profiles in vehicles:
         with suppress(InputError, ModelError):
             loads = static_loads(vehicle, profiles=profiles)
             subject = f"{vehicle.name}, load '{loads.load}' at rest"
-            found += [of_values(table, subject) for table in loads.tables]
-            found.append(of_values(rest_frequencies(vehicle, profiles), subject))
-    return found
+            rest_tables += [page_table(table, subject) for table in loads.tables]
+            rest_tables.append(page_table(rest_frequencies(vehicle, profiles), subject))
+    return rest_tables
 
 
 def _inputs(inputs: Mapping[str, Any]) -> Table:

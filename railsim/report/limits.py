@@ -17,7 +17,7 @@ from railsim.assessment.zones import ZoneReport
 from railsim.compare import differing
 from railsim.errors import InputError, listed
 from railsim.profiles.used import used_profiles
-from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table, of_values
+from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table, page_table
 from railsim.result import Results
 from railsim.result.sensors import sensors
 from railsim.table import beside
@@ -42,85 +42,86 @@ MOST_TOLD = 3  # values that tell vehicles of one name apart; else the names of 
 MOST = 256  # runs that are assessed; more would take long
 
 
-def assessed(results: Results) -> tuple[list[tuple[str, str]], Section]:
+def assess_runs(results: Results) -> tuple[list[tuple[str, str]], Section]:
     """Assess all runs as `railsim assess` does, also those that are sampled too coarsely.
 
     EN 14363 as far as the runs cover its zones; Nadal's limit for each run.  Returns: the kind
     of each verdict on the page, and the verdict in a sentence; the section of the page.
     """
     runs = {name: result for name, result in results.items() if len(result["time"])}
-    verdicts, found = list[tuple[str, str]](), Section("Comparison with limits", id="limits")
+    verdicts, section = list[tuple[str, str]](), Section("Comparison with limits", id="limits")
     if len(runs) > MOST:
         words = f"{len(runs)} runs are not compared with limits; at most {MOST} runs are."
-        found.details.append(remark_table([words]))
-        return verdicts, found
-    running, remarks = _assessed(runs, "en14363")
+        section.details.append(remark_table([words]))
+        return verdicts, section
+    running, remarks = _assess_vehicles(runs, "en14363")
     judged = {name for one in running for name in one.runs}
-    left = [r for name, r in runs.items() if name not in judged and {"Y", "Q"} <= set(r)]
-    for name in dict.fromkeys(result.vehicle().name for result in left):
+    missing = [r for name, r in runs.items() if name not in judged and {"Y", "Q"} <= set(r)]
+    for name in dict.fromkeys(result.vehicle().name for result in missing):
         words = "not assessed to EN 14363; the remarks on these values say why"
         verdicts.append((OPEN, f"{name}: {words}."))
-    running = _told_apart(running, runs)
-    derailment, more = _assessed(runs, "safety")
+    running = _distinguish(running, runs)
+    derailment, of_safety = _assess_vehicles(runs, "safety")
     for one in running:
         parts = ", ".join(f"{WORDS[n]} {v.value}" for n, v in one.verdicts.items())
         edition = one.limits.edition if one.limits else ""
         words = f"{one.vehicle}, {edition}: {one.verdict} ({parts})."
         verdicts.append((KINDS.get(one.verdict, OPEN), words))
-        found.tables.append(_reasons(one))
-        found.details += [_conditions(one), _sections(one), *_track(one), *_rows(one)]
-        found.details += [_influences(one)] if one.influences else []
+        section.tables.append(_reasons(one))
+        section.details += [_conditions(one), _sections(one), *_track(one), *_rows(one)]
+        section.details += [_influences(one)] if one.influences else []
         if any(one.transitions.values()):
-            found.details.append(of_values(transition_table(one), f"Transitions: {one.vehicle}"))
-    found.tables += _zones(running)
-    found.details += [_setup(one, runs) for one in running]
-    found.details += [_sources(one.limits) for one in running[:1] if one.limits]
+            section.details.append(page_table(transition_table(one), f"Transitions: {one.vehicle}"))
+    section.tables += _zones(running)
+    section.details += [_setup(one, runs) for one in running]
+    section.details += [_sources(one.limits) for one in running[:1] if one.limits]
     if derailment:
         table, above = _safety(derailment)
-        found.tables.append(table)
+        section.tables.append(table)
         if above:
             verdicts.append((FAILED, f"Limits exceeded: {'; '.join(above)}."))
-    if words_of := _gathered([*remarks, *more], runs):
-        found.details.append(remark_table(words_of))
-    return verdicts, found
+    if sentences := _remark_sentences([*remarks, *of_safety], runs):
+        section.details.append(remark_table(sentences))
+    return verdicts, section
 
 
-def remark_table(words: Sequence[str]) -> Table:
+def remark_table(remarks: Sequence[str]) -> Table:
     """Return remarks as a table."""
-    return Table(["remark"], [[word] for word in words], "Remarks on these values")
+    return Table(["remark"], [[remark] for remark in remarks], "Remarks on these values")
 
 
-def _assessed(runs: Results, standard: str) -> tuple[list[Assessment], list[str]]:
+def _assess_vehicles(runs: Results, standard: str) -> tuple[list[Assessment], list[str]]:
     """Assess vehicle by vehicle, so that missing quantities of one do not affect the others."""
-    found: list[Assessment] = []
+    assessments: list[Assessment] = []
     remarks: list[str] = []
     for group in by_vehicle(runs, loads=standard in RUNNING):
         try:
-            found += assess(group, standard, coarse=True)
+            assessments += assess(group, standard, coarse=True)
         except InputError as error:
             remarks += [f"{standard}: {fault}" for fault in error.faults]
-    return found, [*remarks, *(remark for one in found for remark in one.remarks)]
+    return assessments, [*remarks, *(remark for one in assessments for remark in one.remarks)]
 
 
-def _told_apart(assessments: Sequence[Assessment], runs: Results) -> list[Assessment]:
+def _distinguish(assessments: Sequence[Assessment], runs: Results) -> list[Assessment]:
     """Assessments of vehicles of one name, with the values that differ or their runs' names."""
-    found = list[Assessment]()
-    for one in assessments:
-        same = [other for other in assessments if other.vehicle == one.vehicle]
+    apart = list[Assessment]()
+    for each in assessments:
+        same = [other for other in assessments if other.vehicle == each.vehicle]
         parts = [
-            f"{' '.join(key.split('.')[-2:]).replace('_', ' ')} {words[same.index(one)]}"
+            f"{' '.join(key.split('.')[-2:]).replace('_', ' ')} {words[same.index(each)]}"
             for key, words in differing([runs[other.runs[0]].vehicle() for other in same]).items()
         ]
-        apart = "; ".join(parts) if 0 < len(parts) <= MOST_TOLD else listed(one.runs)
-        found.append(replace(one, vehicle=f"{one.vehicle} ({apart})") if len(same) > 1 else one)
-    return found
+        marks = "; ".join(parts) if 0 < len(parts) <= MOST_TOLD else listed(each.runs)
+        apart.append(replace(each, vehicle=f"{each.vehicle} ({marks})") if len(same) > 1 else each)
+    return apart
 
 
-def _reasons(one: Assessment) -> Table:
+def _reasons(assessment: Assessment) -> Table:
     """Return the verdicts of a vehicle with a row for each reason; what is equal once."""
-    deciding, rows, failed = getattr(one.limits, "deciding", ()), list[list[str]](), list[int]()
+    deciding = getattr(assessment.limits, "deciding", ())
+    rows, failed = list[list[str]](), list[int]()
     groups: dict[Verdict, list[str]] = {}
-    for name, verdict in one.verdicts.items():
+    for name, verdict in assessment.verdicts.items():
         words = WORDS[name] + ("" if name in deciding else " (for information)")
         groups.setdefault(verdict, []).append(words)
     each = [dict.fromkeys(verdict.reasons) for verdict in groups]
@@ -130,21 +131,21 @@ def _reasons(one: Assessment) -> Table:
             failed += [len(rows)] if KINDS.get(verdict.value) == FAILED else []
             rows.append(["" if k else ", ".join(names), "" if k else verdict.value, reason])
     rows += [["" if k else "all of these", "", reason] for k, reason in enumerate(of_all)]
-    header, caption = ["verdict on", "", "reasons"], f"Verdicts: {one.vehicle}"
+    header, caption = ["verdict on", "", "reasons"], f"Verdicts: {assessment.vehicle}"
     return Table(header, rows, caption, range(3), failed)
 
 
-def _conditions(one: Assessment) -> Table:
+def _conditions(assessment: Assessment) -> Table:
     rows = [
         [c.place or "all runs", c.name, c.state, c.found, c.required, _origin(c)]
-        for c in one.conditions
+        for c in assessment.conditions
     ]
     header = ["", "condition", "", "found", "required", "requirement from"]
-    failed = [k for k, c in enumerate(one.conditions) if c.state == "not met"]
-    return Table(header, rows, f"Conditions of the test: {one.vehicle}", range(6), failed)
+    failed = [k for k, c in enumerate(assessment.conditions) if c.state == "not met"]
+    return Table(header, rows, f"Conditions of the test: {assessment.vehicle}", range(6), failed)
 
 
-def _sections(one: Assessment) -> Table:
+def _sections(assessment: Assessment) -> Table:
     header = ["run", "zone", "from (m)", "to (m)", "R (m)", "I (mm)", "speed (m/s)",
               "alignment (mm)", "level (mm)", "conicity", "quality", "not counted"]  # fmt: skip
     rows = [
@@ -155,16 +156,16 @@ def _sections(one: Assessment) -> Table:
             f"{1e3 * row.level:.2f}", "" if math.isnan(row.conicity) else f"{row.conicity:.2f}",
             row.quality, "" if row.counts else s.reason or "no zone",
         ]
-        for row in one.sections
+        for row in assessment.sections
         for s in [row.section]
     ]  # fmt: skip
-    return Table(header, rows, f"Sections: {one.vehicle}", (0, 10, 11))
+    return Table(header, rows, f"Sections: {assessment.vehicle}", (0, 10, 11))
 
 
-def _track(one: Assessment) -> list[Table]:
+def _track(assessment: Assessment) -> list[Table]:
     """Standard deviations in D2 and D3, and the largest deviation in D1 with its class."""
     texts = {"largest": "largest in D1", "defects": "single defects"}
-    measured = [row for row in one.sections if row.further]
+    measured = [row for row in assessment.sections if row.further]
     header = ["run", "from (m)", "to (m)"]
     for key in measured[0].further if measured else ():
         words = " ".join(texts.get(part, part) for part in key.split("_"))
@@ -174,16 +175,16 @@ def _track(one: Assessment) -> list[Table]:
         + [x if isinstance(x, str) else f"{1e3 * x:.1f}" for x in row.further.values()]
         for row in measured
     ]
-    caption = f"Track of the sections in D2, D3 and single defects: {one.vehicle}"
+    caption = f"Track of the sections in D2, D3 and single defects: {assessment.vehicle}"
     return [Table(header, rows, caption, (0, len(header) - 1))] if rows else []
 
 
-def _rows(one: Assessment) -> list[Table]:
+def _rows(assessment: Assessment) -> list[Table]:
     """Return every quantity of every zone and population, with and without a limit."""
     header = ["", "unit", "N", "mean", "s", "method", "line", "s_e", "estimate", "uncorrected",
               "limit", "limit from"]  # fmt: skip
     tables = []
-    for zone in one.zones:
+    for zone in assessment.zones:
         rows: list[list[Cell]] = []
         for row in (*zone.rows, *zone.information):
             e, line, text = row.estimate, row.estimate.line, row.criterion.text
@@ -199,27 +200,27 @@ def _rows(one: Assessment) -> list[Table]:
         if not rows:
             continue  # no section counts; the reasons are among the conditions
         tables.append(Table(
-            header, rows, f"All values: {one.vehicle}, {zone.title}", (0, 1, 5, 11),
+            header, rows, f"All values: {assessment.vehicle}, {zone.title}", (0, 1, 5, 11),
             note="line and s_e: regression over the cant deficiency at the admissible one, and its "
             "standard error.",
         ))  # fmt: skip
     return tables
 
 
-def _influences(one: Assessment) -> Table:
+def _influences(assessment: Assessment) -> Table:
     rows: list[list[Cell]] = []
-    for found in one.influences:
-        rule, solved = found.criterion, found.regression
+    for influence in assessment.influences:
+        rule, solved = influence.criterion, influence.regression
         constant, deficiency, curvature = (rule.scale * c for c in solved.coefficients)
         rows.append([
-            (rule.words, ", ".join(filter(None, [found.place, found.population]))),
+            (rule.words, ", ".join(filter(None, [influence.place, influence.population]))),
             rule.unit, str(solved.N), f"{constant:.3g}", f"{1e-3 * deficiency:.3g}",
             f"{1e-3 * curvature:.3g}", rule.text(solved.error), f"{solved.determination:.2f}",
             rule.text(solved.value),
         ])  # fmt: skip
     return Table(
         ["", "unit", "N", "constant", "per mm of I", "per 1/km", "s_e", "R2", "value"], rows,
-        f"Multiple regression, for information: {one.vehicle}", (0, 1),
+        f"Multiple regression, for information: {assessment.vehicle}", (0, 1),
         note="All curves of zones 2 to 4 of a population over cant deficiency I and curvature; "
         f"value: at the admissible cant deficiency and R {RADIUS:.0f} m.",
     )  # fmt: skip
@@ -256,31 +257,31 @@ def _off(distance: float, on: str, back: str) -> str:
 
 def _sources(limits: Any) -> Table:
     rows = [
-        [one.words, WORDS[one.group], one.meaning, _origin(law)]
-        for one in CRITERIA.values()
-        if (law := limits.limits.get(one.name)) is not None
+        [criterion.words, WORDS[criterion.group], criterion.meaning, _origin(law)]
+        for criterion in CRITERIA.values()
+        if (law := limits.limits.get(criterion.name)) is not None
     ]
     header = ["", "verdict on", "", "limit from"]
     return Table(header, rows, f"Limits of {limits.edition}", range(4))
 
 
-def _origin(of: Any) -> str:
-    return of.source if of.checked or of.source == "ours" else f"{of.source}, unchecked"
+def _origin(limit: Any) -> str:
+    return limit.source if limit.checked or limit.source == "ours" else f"{limit.source}, unchecked"
 
 
-def _gathered(remarks: Sequence[str], runs: Results) -> list[str]:
+def _remark_sentences(remarks: Sequence[str], runs: Results) -> list[str]:
     """Return remarks as sentences, equal remarks on several runs once."""
     by_text: dict[str, list[str]] = {}
     for remark in remarks:
         name, _, text = remark.partition(": ")
-        known = name in runs and bool(text)
-        by_text.setdefault(text if known else remark, []).extend([name] if known else [])
-    found = []
+        of_run = name in runs and bool(text)
+        by_text.setdefault(text if of_run else remark, []).extend([name] if of_run else [])
+    sentences = []
     for text, names in by_text.items():
-        own = list(dict.fromkeys(names))
-        who = own[0] if len(own) == 1 else f"{len(own)} runs"
-        found.append(f"{who + ': ' if own else ''}{text.removesuffix('.')}.")
-    return found
+        distinct = list(dict.fromkeys(names))
+        who = distinct[0] if len(distinct) == 1 else f"{len(distinct)} runs"
+        sentences.append(f"{who + ': ' if distinct else ''}{text.removesuffix('.')}.")
+    return sentences
 
 
 def _zones(assessments: Sequence[Assessment]) -> list[Table]:
@@ -294,7 +295,7 @@ def _zones(assessments: Sequence[Assessment]) -> list[Table]:
         rows: list[list[Cell]] = []
         failed = []
         for rule in rules:
-            own = [found.get(rule) for found in worst.values()]
+            own = [reports.get(rule) for reports in worst.values()]
             first = next(pair for pair in own if pair)[1]
             limits = dict.fromkeys(_limit(pair[1]) for pair in own if pair)
             if any(pair and pair[1].exceeded for pair in own):
@@ -333,11 +334,11 @@ def _limit(row: Row) -> tuple[str, str]:
     return f"{row.criterion.text(row.limit)} {unit}", _origin(row)
 
 
-def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:
+def _safety(assessments: Sequence[Assessment]) -> tuple[Table, list[str]]:
     """Return the wheel of each run that is nearest to Nadal's limit."""
     rows: list[Sequence[Cell]] = []
     failed, above = [], []
-    for run, report in [pair for one in found for pair in one.safety.items()]:
+    for run, report in [pair for one in assessments for pair in one.safety.items()]:
         # a wheel that never carried load has no quotient
         shares = [
             -math.inf if math.isnan(w.Y_over_Q) else w.Y_over_Q / w.limit for w in report.wheels

@@ -21,7 +21,7 @@ from railsim.identification.identified import (
     residual_table,
 )
 from railsim.plot import validation as plots
-from railsim.report.document import Drawing, Section, as_png, document, of_values, pictures
+from railsim.report.document import Drawing, Section, as_png, document, page_table, pictures
 from railsim.report.wear import RAILS, WHEELS, shares_of, wear_tables
 
 RECORDS = ("model_validation.json", "identified.json", "wear.json")
@@ -87,43 +87,43 @@ def as_section(part: Part, number: int) -> Section:
     for section in part.sections:
         found.texts += section.texts
         found.drawings += section.drawings
-        found.details += [of_values(table, section.title) for table in section.tables]
+        found.details += [page_table(table, section.title) for table in section.tables]
     found.tables, found.details = found.details[:1], found.details[1:]
     return found
 
 
-def drawn(figures: Mapping[str, Figure]) -> list[Drawing]:
+def as_drawings(figures: Mapping[str, Figure]) -> list[Drawing]:
     """Return figures by their names as drawings with captions."""
     return pictures({name: as_png(figure) for name, figure in figures.items()}, CAPTIONS)
 
 
-def validation_figures(found: ModelValidation) -> dict[str, Figure]:
+def validation_figures(validation: ModelValidation) -> dict[str, Figure]:
     """Return the pictures of a comparison by their names; those of channels where it has them."""
-    figures = {"scatter": plots.scatter(found), "differences": plots.differences(found)}
-    if found.overlays:
-        figures |= {"overlays": plots.overlays(found), "spectra": plots.spectra(found)}
+    figures = {"scatter": plots.scatter(validation), "differences": plots.differences(validation)}
+    if validation.overlays:
+        figures |= {"overlays": plots.overlays(validation), "spectra": plots.spectra(validation)}
     return figures
 
 
-def of_validation(found: ModelValidation, more: Sequence[Drawing] = ()) -> Part:
-    """Return what a page says about a model against a test; `more` pictures at the end."""
+def validation_part(result: ModelValidation, further: Sequence[Drawing] = ()) -> Part:
+    """Return what a page says about a model against a test; `further` pictures at the end."""
     words = {FAIL: "The model does not match the test.", INCOMPLETE: "Too few sections."}
-    text = words.get(found.verdict, "The model matches the test within all limits.")
+    text = words.get(result.verdict, "The model matches the test within all limits.")
     sections = [
-        Section("Differences and limits", tables=[found.table()]),
-        Section("Pictures", drawings=[*drawn(validation_figures(found)), *more]),
-        Section("Values of the sections", [UNITS], [found.section_table()]),
+        Section("Differences and limits", tables=[result.table()]),
+        Section("Pictures", drawings=[*as_drawings(validation_figures(result)), *further]),
+        Section("Values of the sections", [UNITS], [result.section_table()]),
     ]
-    method = (*VALIDATION, found.edition)
-    return Part(found.title, text, found.verdict not in words, found.remarks, sections, method)
+    method = (*VALIDATION, result.edition)
+    return Part(result.title, text, result.verdict not in words, result.remarks, sections, method)
 
 
-def identification_figures(found: Identified) -> dict[str, Figure]:
+def identification_figures(identified: Identified) -> dict[str, Figure]:
     """Return the pictures of an identification by their names."""
-    return {"fits": plots.fits(found), "residuals": plots.residual_spectra(found)}
+    return {"fits": plots.fits(identified), "residuals": plots.residual_spectra(identified)}
 
 
-def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
+def identification_part(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
     """Return what a page says about an identification, by its record."""
     unidentified = record["unidentified"]
     not_white = coloured((one["channel"], one["white"] is not False) for one in record["channels"])
@@ -146,7 +146,7 @@ def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part
     return Part(title, text, good, remarks, sections, IDENTIFICATION)
 
 
-def of_wear(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
+def wear_part(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
     """Return what a page says about the wear of wheels or rails, by its record."""
     if "track" in record:
         what, of, worn, runs, sides = "rails", RAILS, "track", "traffic", RAILS.sides
@@ -185,18 +185,18 @@ def read_part(file: str | Path) -> Part:
     try:
         record = json.loads(read_bytes(path, LARGEST_RECORD))
         if path.name == RECORDS[0]:
-            return of_validation(ModelValidation.of(record), _pictures(path.parent, "overlays"))
+            return validation_part(ModelValidation.of(record), _pictures(path.parent, "overlays"))
         if path.name == RECORDS[1]:
-            return of_identification(record, _pictures(path.parent, "fits", "residuals"))
-        return of_wear(record, _pictures(path.parent, "wear"))
+            return identification_part(record, _pictures(path.parent, "fits", "residuals"))
+        return wear_part(record, _pictures(path.parent, "wear"))
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
-        words = f"{type(error).__name__}: {error}"[:100]
+        found = f"{type(error).__name__}: {error}"[:100]
         allowed = "the file as its command has written it"
-        raise input_error(path, words, allowed) from None
+        raise input_error(path, found, allowed) from None
 
 
 def _pictures(folder: Path, *names: str) -> list[Drawing]:
     """Return pictures beside a record, those that are there."""
     files = {name: folder / f"{name}.png" for name in names}
-    drawn = {n: read_bytes(f, LARGEST_PICTURE) for n, f in files.items() if f.is_file()}
-    return pictures({n: x for n, x in drawn.items() if x[:8] == PNG}, CAPTIONS, names)
+    as_drawings = {n: read_bytes(f, LARGEST_PICTURE) for n, f in files.items() if f.is_file()}
+    return pictures({n: x for n, x in as_drawings.items() if x[:8] == PNG}, CAPTIONS, names)

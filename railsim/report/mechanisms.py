@@ -27,7 +27,7 @@ from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tolerance import scatter
 from railsim.plot import mechanisms as plots
 from railsim.plot.style import styled
-from railsim.report.document import Drawing, Section, as_png, of_design, pictures
+from railsim.report.document import Drawing, Section, as_png, design_page, pictures
 from railsim.table import Table
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ TOLERANCES = (
 
 
 @dataclass(frozen=True)
-class Collected:
+class PageResults:
     """Results on the page."""
 
     results: Sequence[Analysis]  # one for each file; the first is the one that the page describes
@@ -91,30 +91,30 @@ NAMES = (REPORT, "animation.gif", "positions.csv", "motion.csv", *(f"{n}.png" fo
 """Of all files that there can be of one mechanism."""
 
 
-def files(collected: Collected) -> dict[str, bytes]:
+def files(contents: PageResults) -> dict[str, bytes]:
     """Page, pictures, animation and tables by the names of their files."""
-    drawn = {name: as_png(figure) for name, figure in figures(collected).items()}
-    content = {f"{name}.png": png for name, png in drawn.items()}
-    content["animation.gif"] = animation(collected.result)
-    content["positions.csv"] = positions(collected.result)
-    if collected.result.timed is not None:
-        content["motion.csv"] = motion_table(collected.result)
-    return content | {REPORT: page(collected, drawn).encode()}
+    images = {name: as_png(figure) for name, figure in figures(contents).items()}
+    content = {f"{name}.png": png for name, png in images.items()}
+    content["animation.gif"] = animation(contents.result)
+    content["positions.csv"] = positions(contents.result)
+    if contents.result.timed is not None:
+        content["motion.csv"] = motion_table(contents.result)
+    return content | {REPORT: page(contents, images).encode()}
 
 
-def figures(collected: Collected) -> dict[str, Figure]:
+def figures(contents: PageResults) -> dict[str, Figure]:
     """Draw all pictures; returned by the names of their files."""
-    result, optimum = collected.result, collected.optimum
+    result, optimum = contents.result, contents.optimum
     definition, output = result.definition, result.output
-    compared = _compared(collected) if "ratio" in output or result.zone else {}
+    compared = _side_by_side(contents) if "ratio" in output or result.zone else {}
     solved = definition.held_by if definition.solve else None
     compares = bool(compared) and "ratio" in output
     held = any("pressure" in one.output for one in compared.values())
     cams = any(hasattr(joint, "cam") for joint in definition.joints.values())
-    gas, cases = any(name.endswith("_length") for name in output), list(collected.cases)
+    gas, cases = any(name.endswith("_length") for name in output), list(contents.cases)
     zoomed, air = partial(plots.comparison_figure, zoom=True), isinstance(solved, AirSpring)
     # whether there is something to draw, and what draws it
-    wanted: dict[str, tuple[object, Callable[..., Figure], Any]] = {
+    candidates: dict[str, tuple[object, Callable[..., Figure], Any]] = {
         "drawing": (True, plots.drawing_figure, result),
         "path": ("height" in output, plots.path_figure, result),
         "kinematics": (True, plots.kinematics_figure, result),
@@ -126,32 +126,32 @@ def figures(collected: Collected) -> dict[str, Figure]:
         "contact": (result.contact, plots.contact_figure, result),
         "carpet": ("pressure" in output and air, plots.carpet_figure, result),
         "gas_springs": (gas, plots.gas_spring_figure, result),
-        "cases": ("force" in output and cases[1:], plots.cases_figure, collected.cases),
+        "cases": ("force" in output and cases[1:], plots.cases_figure, contents.cases),
         "time": (result.timed, plots.time_figure, result),
         "comparison": (compares, plots.comparison_figure, compared),
         "comparison_held": (compares and held, plots.held_figure, compared),
         "comparison_zone": (compares and result.zone, zoomed, compared),
         "search": (optimum, plots.search_figure, optimum),
     }
-    drawn = {name: draw(what) for name, (there, draw, what) in wanted.items() if there}
-    others = collected.results[1:] if optimum is None else ()
+    drawn = {name: draw(data) for name, (use, draw, data) in candidates.items() if use}
+    others = contents.results[1:] if optimum is None else ()
     return drawn | {
         f"drawing_{i}": plots.drawing_figure(other) for i, other in enumerate(others, start=2)
     }
 
 
-def _compared(collected: Collected) -> dict[str, Analysis]:
+def _side_by_side(contents: PageResults) -> dict[str, Analysis]:
     """Mechanisms side by side by their labels: several files, or before and after a search."""
-    optimum = collected.optimum
+    optimum = contents.optimum
     if optimum is not None and optimum.before is not None:
         return {"as in the file": optimum.before, "optimised": optimum.after}
-    if len(collected.results) < 2:
+    if len(contents.results) < 2:
         return {}
-    found: dict[str, Analysis] = {}
-    for result in collected.results:
+    by_label: dict[str, Analysis] = {}
+    for result in contents.results:
         label = result.definition.name + (f", {result.case}" if result.case else "")
-        found[label if label not in found else f"{label} ({len(found) + 1})"] = result
-    return found
+        by_label[label if label not in by_label else f"{label} ({len(by_label) + 1})"] = result
+    return by_label
 
 
 def positions(result: Analysis) -> bytes:
@@ -279,31 +279,31 @@ def _sentences(result: Analysis, s: Any) -> list[str]:
     return found
 
 
-def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
+def page(contents: PageResults, images: Mapping[str, bytes]) -> str:
     """Return the page as HTML, with PNG pictures by the names of `figures`."""
-    result = collected.result
+    result = contents.result
     definition, made = result.definition, checks(result)
 
-    def shown(*names: str) -> list[Drawing]:
-        return pictures(drawn, CAPTIONS, names)
+    def drawings(*names: str) -> list[Drawing]:
+        return pictures(images, CAPTIONS, names)
 
     rows = [tables.position_table(result), tables.published_table(result)]
     rows = [table for table in (*rows, check_table(made, notes=True)) if len(table)]
-    sections = [Section("Results", tables.sentences(result), rows, shown("drawing", "path"))]
-    compared = shown("comparison", "comparison_held", "comparison_zone")
-    if (optimum := collected.optimum) is not None:
+    sections = [Section("Results", tables.sentences(result), rows, drawings("drawing", "path"))]
+    compared = drawings("comparison", "comparison_held", "comparison_zone")
+    if (optimum := contents.optimum) is not None:
         found = tables.optimum_sentences(optimum), tables.optimum_tables(optimum)
-        sections.append(Section("Search", *found, shown("search")))
+        sections.append(Section("Search", *found, drawings("search")))
         sections.append(Section("Before and after the search", drawings=compared))
-    if len(collected.results) > 1:
-        compared += shown(*(name for name in drawn if name.startswith("drawing_")))
-        rows = [tables.comparison_table(collected.results)]
+    if len(contents.results) > 1:
+        compared += drawings(*(name for name in images if name.startswith("drawing_")))
+        rows = [tables.comparison_table(contents.results)]
         sections.append(Section("Comparison", [], rows, compared))
-    kinematics = shown("kinematics", "actuators", "angles", "cam")
+    kinematics = drawings("kinematics", "actuators", "angles", "cam")
     forces = ("ratio_force", "pressure", "carpet", "contact", "gas_springs", "cases", "time")
     rows = [tables.reaction_table(result)]
     sections.append(Section("Kinematics", drawings=kinematics))
-    sections.append(Section("Forces and motion", [], rows, shown(*forces)))
+    sections.append(Section("Forces and motion", [], rows, drawings(*forces)))
     if choices := selection(result):
         sections.append(Section("Selection", [], [tables.selection_table(choices)]))
     if definition.tolerances:
@@ -314,4 +314,4 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
     title = f"Mechanism: {definition.name}" + (f", {result.case}" if result.case else "")
     play = {"scripts": ["templates/player.js"], "data": data, "box": box, "last": FRAMES - 1}
     words = remarks(result)
-    return of_design(title, definition.source, made, sections, METHOD, remarks=words, **play)
+    return design_page(title, definition.source, made, sections, METHOD, remarks=words, **play)

@@ -14,10 +14,10 @@ from railsim.result import Result, Results
 
 
 @dataclass(frozen=True)
-class Beside:
+class Comparison:
     """A published value and the value of a run.
 
-    `published`, `found`: The two values [SI].
+    `published`, `computed`: The two values [SI].
     """
 
     study: Published  # publication
@@ -25,25 +25,25 @@ class Beside:
     run: str  # name of the run
     rails: str  # rails of the run: ``elastic`` or ``rigid``
     published: float
-    found: float
+    computed: float
 
     @property
     def difference(self) -> float:
         """Relative difference of the magnitudes."""
-        return (abs(self.found) - abs(self.published)) / abs(self.published)
+        return (abs(self.computed) - abs(self.published)) / abs(self.published)
 
 
-def beside_published(results: Results) -> list[Beside]:
+def published_comparisons(results: Results) -> list[Comparison]:
     """Return every published value that the runs can be compared with.
 
     A run is compared if vehicle and speed are those of the publication and its track differs at
     most in the support of the rails, which publications rarely specify.
     """
     studies = [load(Published, name) for name in library_files("published")]
-    return [row for study in studies for row in _of_study(study, results)]
+    return [row for study in studies for row in _study_comparisons(study, results)]
 
 
-def _of_study(study: Published, results: Results) -> Sequence[Beside]:
+def _study_comparisons(study: Published, results: Results) -> Sequence[Comparison]:
     track = load_track(study.track)
     names = dict.fromkeys(name for value in study.values for name in value.values)
     vehicles = {name: load_vehicle(name) for name in names}
@@ -51,15 +51,15 @@ def _of_study(study: Published, results: Results) -> Sequence[Beside]:
     for run, result in results.items():
         if not isclose(result.speed, study.speed, rel_tol=1e-9):
             continue
-        there = result.track()
-        if there.replace(support=track.support) != track:
+        run_track = result.track()
+        if run_track.replace(support=track.support) != track:
             continue
         vehicle = result.vehicle()
-        name = next((name for name, known in vehicles.items() if known == vehicle), None)
-        rails = "rigid" if there.support.preset == "rigid" else "elastic"
+        name = next((name for name, published in vehicles.items() if published == vehicle), None)
+        rails = "rigid" if run_track.support.preset == "rigid" else "elastic"
         for value in study.values:
-            if name in value.values and (found := reading(result, value)) is not None:
-                rows.append(Beside(study, value, run, rails, value.values[name], found))
+            if name in value.values and (computed := reading(result, value)) is not None:
+                rows.append(Comparison(study, value, run, rails, value.values[name], computed))
     return rows
 
 

@@ -23,9 +23,9 @@ from railsim.plot.assessment import assessment_figure
 from railsim.report import document as doc
 from railsim.report import spread
 from railsim.report.curves import cells_of, curve_data, groups
-from railsim.report.inputs import Used, inputs_of, units_of, what_was_run
-from railsim.report.limits import assessed, remark_table
-from railsim.report.published import beside_published
+from railsim.report.inputs import Inputs, inputs_of, inputs_section, units_of
+from railsim.report.limits import assess_runs, remark_table
+from railsim.report.published import published_comparisons
 from railsim.result import Results
 from railsim.text import printable
 from railsim.version import __version__
@@ -46,7 +46,7 @@ def page(
     remarks: Sequence[str] = (),
     assessable: Results | None = None,
     inputs: Mapping[str, Any] | None = None,
-    used: Sequence[Used] = (),
+    run_inputs: Sequence[Inputs] = (),
     assessments: Sequence[Assessment] = (),
     measured: Sequence[doc.Section] = (),
 ) -> str:
@@ -56,11 +56,10 @@ def page(
     with ``name`` and ``labels``, including runs that failed or have not been done. `results`:
     Results, by the names of their runs, whose curves are shown. `remarks`: Further notes for the
     reader. `assessable`: All results, which are assessed together and whose inputs are told; by
-    default `results`. `inputs`:
-    Inputs of the study whose runs these are, as in its ``study.json``. `used`: What runs without
-    results used, as the files are now. `assessments`: Those of a scenario; comfort, wear and
-    safety are shown in sections of their own. `measured`: Comparisons with tests and
-    identifications.
+    default `results`. `inputs`: Inputs of the study whose runs these are, as in its ``study.json``.
+    `run_inputs`: Those of runs without results, as the files are now. `assessments`: Those of a
+    scenario; comfort, wear and safety are shown in sections of their own. `measured`: Comparisons
+    with tests and identifications.
     """
     inputs = inputs or {}
     found = groups(results)
@@ -68,13 +67,13 @@ def page(
     curves = [curve_data(group, cells) for group in found]
     data: dict[str, Any] = {"curves": [group for group in curves if group["quantities"]]}
     every = results if assessable is None else assessable
-    verdicts, limits = assessed(every)
+    verdicts, limits = assess_runs(every)
     peaks = any(record["name"] in results for record in _done(records))
-    used = inputs_of(records, every) or list(used)
-    units = units_of(records, used[:MOST_UNITS])
+    run_inputs = inputs_of(records, every) or list(run_inputs)
+    units = units_of(records, run_inputs[:MOST_UNITS])
     few, analysed = len(records) < spread.LEAST, any(one.get("quantities") for one in records)
     sections = [_peaks(records, results)] if peaks or (few and not analysed) else []
-    sections += [_assessed(one) for one in assessments if one.standard not in RUNNING]
+    sections += [_assessment_section(one) for one in assessments if one.standard not in RUNNING]
     if len(_done(records)) > max(spread.LEAST, len(results)):
         sections.append(_worst(records, units))
     if found and (data["curves"] or peaks):
@@ -84,7 +83,7 @@ def page(
     if analysed or not few:
         sections.append(_spread(records, data, inputs, units))
     sections += [*_published(every), *measured]
-    sections.append(what_was_run(used, every, inputs))
+    sections.append(inputs_section(run_inputs, every, inputs))
     sections.append(_remarks(records, remarks))
     return rendered(
         "railsim.report", "templates/runs.html", title=title,
@@ -108,7 +107,7 @@ def _lead(records: Sequence[Record], results: Results) -> str:
     if len(records) == len(results) == 1:
         parts += [result.title for result in results.values()]
     else:
-        parts += filter(None, (_named(records, kind) for kind in ("vehicle", "track", "speed")))
+        parts += filter(None, (_in_words(records, kind) for kind in ("vehicle", "track", "speed")))
     versions = sorted({str(r.attributes.get("railsim_version", "")) for r in results.values()})
     created = sorted(str(r.attributes.get("created", "")) for r in results.values())
     if versions and any(versions):
@@ -118,17 +117,17 @@ def _lead(records: Sequence[Record], results: Results) -> str:
     return "; ".join(parts) + "."
 
 
-def _named(records: Sequence[Record], kind: str) -> str:
+def _in_words(records: Sequence[Record], kind: str) -> str:
     """Return the vehicles, tracks or speeds of runs, or their number where there are many."""
-    found = list(dict.fromkeys(record["labels"].get(kind, "") for record in records))
-    if kind == "speed" and "" in found:  # every run has one, but not every record names it
+    labels = list(dict.fromkeys(record["labels"].get(kind, "") for record in records))
+    if kind == "speed" and "" in labels:  # every run has one, but not every record names it
         return ""
     unit = " m/s" if kind == "speed" else ""
-    if len(found) <= 4 and all(map(str, found)):
-        words = ", ".join(f"{one:.6g}" if unit else str(one) for one in found)
-        return f"{kind}{'s' * (len(found) > 1)} {words}{unit}"
-    span = f" from {min(found):.6g} to {max(found):.6g} m/s" if unit else ""
-    return f"{len(found)} {kind}s{span}"
+    if len(labels) <= 4 and all(map(str, labels)):
+        words = ", ".join(f"{label:.6g}" if unit else str(label) for label in labels)
+        return f"{kind}{'s' * (len(labels) > 1)} {words}{unit}"
+    span = f" from {min(labels):.6g} to {max(labels):.6g} m/s" if unit else ""
+    return f"{len(labels)} {kind}s{span}"
 
 
 def _verdict(
@@ -192,11 +191,11 @@ def _worst(records: Sequence[Record], units: Mapping[str, str]) -> doc.Section:
     return doc.Section(title, [text], tables=[table], id="worst")
 
 
-def _largest(shown: int, done: int) -> str:
-    return f"{shown} of {done} runs, those with the largest values"
+def _largest(number: int, total: int) -> str:
+    return f"{number} of {total} runs, those with the largest values"
 
 
-def _assessed(assessment: Assessment) -> doc.Section:
+def _assessment_section(assessment: Assessment) -> doc.Section:
     """An assessment of comfort, wear or safety: its picture and its tables, folded."""
     section = doc.Section(f"Assessment: {assessment.standard}", id=assessment.standard)
     figure = assessment_figure([assessment])
@@ -206,7 +205,7 @@ def _assessed(assessment: Assessment) -> doc.Section:
         image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format(words, code)
         section.drawings.append(doc.Drawing(assessment.vehicle, "", image))
     section.details = [
-        doc.of_values(one, str(one.columns[0].heading)) for one in tables(assessment)
+        doc.page_table(one, str(one.columns[0].heading)) for one in tables(assessment)
     ]
     if assessment.remarks:
         section.details.append(remark_table(assessment.remarks))
@@ -257,20 +256,20 @@ def _spread(
 
 def _published(results: Results) -> list[doc.Section]:
     """Published values beside those of the runs, where there are any."""
-    rows = beside_published(results)
+    rows = published_comparisons(results)
     tables = []
     for study in dict.fromkeys(row.study.name for row in rows):
-        own = [row for row in rows if row.study.name == study]
+        of_study = [row for row in rows if row.study.name == study]
         cells = []
-        for row in own:
+        for row in of_study:
             quantity = QUANTITIES[row.value.quantity]
             side = f" {row.value.side}" if row.value.side else ""
             at = row.value.read if isinstance(row.value.read, str) else f"t = {row.value.read:g} s"
             where = f"wheelset {row.value.wheelset}{side}, {at}"
-            numbers = quantity.text(row.published), quantity.text(row.found)
+            numbers = quantity.text(row.published), quantity.text(row.computed)
             difference = f"{100.0 * row.difference:+.1f} %"
             cells.append([row.run, quantity.words, where, *numbers, difference, row.rails])
-        first = own[0].study
+        first = of_study[0].study
         note = f"{first.program}: {first.source}. {' '.join(first.notes)}"
         header = ["run", "quantity", "evaluated at", "published", "computed", "difference", "rails"]
         tables.append(doc.Table(header, cells, first.name, (0, 1, 2), note=note))
@@ -278,9 +277,9 @@ def _published(results: Results) -> list[doc.Section]:
     return [doc.Section(title, tables=tables, id="published")] if tables else []
 
 
-def _remarks(records: Sequence[Record], more: Sequence[str]) -> doc.Section:
+def _remarks(records: Sequence[Record], sentences: Sequence[str]) -> doc.Section:
     """Runs that failed or ended early, and remarks, equal ones once."""
-    section = doc.Section("Failures and remarks", [*more], id="remarks")
+    section = doc.Section("Failures and remarks", [*sentences], id="remarks")
     ended: dict[tuple[str, str], list[Record]] = {}
     for record in records:
         if record["status"] != "complete":  # one reason for whatever numbers it tells
@@ -290,12 +289,12 @@ def _remarks(records: Sequence[Record], more: Sequence[str]) -> doc.Section:
     for (status, _), group in sorted(ended.items(), key=lambda item: -len(item[1])):
         names = listed([str(record["name"]) for record in group])
         rows.append([f"{len(group)}", status, str(group[0].get("status_reason", "")), names])
-    said: dict[str, list[str]] = {}
+    by_remark: dict[str, list[str]] = {}
     for record in records:
         for remark in record.get("remarks", ()):
-            said.setdefault(str(remark), []).append(str(record["name"]))
+            by_remark.setdefault(str(remark), []).append(str(record["name"]))
     short = sum(map(len, ended.values()))
-    remarks = [[remark, listed(names)] for remark, names in said.items()]
+    remarks = [[remark, listed(names)] for remark, names in by_remark.items()]
     caption = f"{short} of {len(records)} runs did not reach the requested end"
     for table, none in (
         (doc.Table(["runs", "status", "reason, of the first", "which"], rows, caption, range(1, 4)),

@@ -107,10 +107,10 @@ def columns(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
     Returns: each with ``words``, ``unit``, ``decimals`` (None: four digits), and one of ``values``
     for each run, or None.
     """
-    found: dict[str, dict[str, Any]] = {}
+    by_key: dict[str, dict[str, Any]] = {}
 
     def add(run: int, key: str, words: str, unit: str, value: float) -> None:
-        column = found.setdefault(key, {
+        column = by_key.setdefault(key, {
             "words": words, "unit": unit, "decimals": DECIMALS.get(unit or "-"),
             "values": [None] * len(records),
         })  # fmt: skip
@@ -123,8 +123,8 @@ def columns(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
         for key, value in record.get("quantities", {}).items():
             if value is not None:  # of an analysis or of a user function, in SI
                 add(number, key, printable(key), unit_of_number(key), value)
-                found[key]["decimals"] = None  # of any size
-    return found
+                by_key[key]["decimals"] = None  # of any size
+    return by_key
 
 
 def _values(record: Record) -> list[tuple[str, str, Quantity, float]]:
@@ -158,9 +158,9 @@ def spread_rows(records: Sequence[Record]) -> list[list[str]]:
         if len(pairs) < LEAST:
             continue
         low, high = min(pairs), max(pairs)
-        middle = _shown(median(value for value, _ in pairs), column)
+        middle = _cell_text(median(value for value, _ in pairs), column)
         low_cells, high_cells = (
-            [_shown(value, column), str(records[i]["name"])] for value, i in (low, high)
+            [_cell_text(value, column), str(records[i]["name"])] for value, i in (low, high)
         )
         rows.append([_heading(column), *low_cells, middle, *high_cells])
     return rows
@@ -174,19 +174,19 @@ def worst_rows(
     The quantities are those by which the runs with curves are chosen; where no run has any of
     them, those of analyses and functions of the user.
     """
-    there, varied = columns(records), parameters(records, units)
+    by_key, varied = columns(records), parameters(records, units)
     rows: list[list[tuple[str, str] | str]] = []
-    own = [key for key in there if "_mid" not in key and not key.endswith(tuple(WORDS))]
-    for key in [name for name in RANKED if name in there] or own:
-        column = there[key]
+    others = [key for key in by_key if "_mid" not in key and not key.endswith(tuple(WORDS))]
+    for key in [name for name in RANKED if name in by_key] or others:
+        column = by_key[key]
         row: list[tuple[str, str] | str] = [_heading(column)]
         for number in largest_first(column["values"])[:WORST]:
-            told = (
-                f"{own['words']} {_text(own['values'][number])} {own['unit']}".rstrip()
-                for own in varied.values()
+            differences = (
+                f"{each['words']} {_text(each['values'][number])} {each['unit']}".rstrip()
+                for each in varied.values()
             )
-            where = ", ".join(told) or str(records[number]["name"])
-            row.append((_shown(column["values"][number], column), where))
+            where = ", ".join(differences) or str(records[number]["name"])
+            row.append((_cell_text(column["values"][number], column), where))
         rows.append(row + [""] * (1 + WORST - len(row)))
     return rows
 
@@ -195,7 +195,7 @@ def _heading(column: Mapping[str, str]) -> str:
     return column["words"] + (f" ({column['unit']})" if column["unit"] else "")
 
 
-def _shown(value: float, column: Mapping[str, Any]) -> str:
+def _cell_text(value: float, column: Mapping[str, Any]) -> str:
     decimals = column["decimals"]
     return f"{value:.4g}" if decimals is None else f"{value:.{decimals}f}"
 

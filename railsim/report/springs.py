@@ -1,6 +1,6 @@
 """A self-contained page about a trailing-arm suspension: inputs, results, checks, pictures.
 
-`collected` computes all results that the file allows, `figures` draws them, `page` returns HTML.
+`compute` computes all results that the file allows, `figures` draws them, `page` returns HTML.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ from railsim.definitions.spring import TrailingArmSuspension
 from railsim.design_checks import check_table
 from railsim.errors import InputError
 from railsim.plot import springs as plots
-from railsim.report.document import Drawing, Section, as_png, of_design, pictures
+from railsim.report.document import Drawing, Section, as_png, design_page, pictures
 from railsim.springs import tables
 from railsim.springs.datasheet import data_sheets
 from railsim.springs.design import Design, design
@@ -72,7 +72,7 @@ NAMES = (REPORT, *(f"{name}.png" for name in CAPTIONS))
 
 
 @dataclass(frozen=True)
-class Collected:
+class PageResults:
     """All results for a suspension that its file allows; None where it has no such table."""
 
     suspension: TrailingArmSuspension
@@ -84,7 +84,7 @@ class Collected:
     remarks: tuple[str, ...]  # what could not be computed, with reasons
 
 
-def collected(suspension: TrailingArmSuspension, search: "SearchResult | None" = None) -> Collected:
+def compute(suspension: TrailingArmSuspension, search: "SearchResult | None" = None) -> PageResults:
     """Compute all results that a suspension file allows.
 
     Raises InputError: the suspension cannot be verified.
@@ -95,7 +95,7 @@ def collected(suspension: TrailingArmSuspension, search: "SearchResult | None" =
             designed = design(suspension)
         except InputError as error:
             remarks = [f"Design: {fault.key}: {fault.found}." for fault in error.faults]
-    return Collected(
+    return PageResults(
         suspension=suspension, verification=verify(suspension), design=designed,
         fatigue=fatigue(suspension) if suspension.fatigue is not None else None,
         ride_heights=ride_heights(suspension) if suspension.tolerances is not None else None,
@@ -107,13 +107,13 @@ def files(
     suspension: TrailingArmSuspension, search: "SearchResult | None" = None
 ) -> dict[str, bytes]:
     """Compute what a suspension file allows; pictures and the page by the names of their files."""
-    results = collected(suspension, search)
+    results = compute(suspension, search)
     drawn = {name: as_png(figure) for name, figure in figures(results).items()}
     content = {f"{name}.png": png for name, png in drawn.items()}
     return content | {REPORT: page(results, drawn).encode()}
 
 
-def figures(results: Collected) -> dict[str, Figure]:
+def figures(results: PageResults) -> dict[str, Figure]:
     """Draw all pictures; returned by the names of their files."""
     suspension = results.suspension
     made = {
@@ -133,12 +133,12 @@ def figures(results: Collected) -> dict[str, Figure]:
     return made
 
 
-def page(results: Collected, figures: Mapping[str, bytes]) -> str:
+def page(results: PageResults, figures: Mapping[str, bytes]) -> str:
     """Return the page as HTML, with PNG pictures by the names of `figures`."""
     suspension, verification = results.suspension, results.verification
     sheets = data_sheets(suspension, verification)
 
-    def shown(*names: str) -> list[Drawing]:
+    def drawings(*names: str) -> list[Drawing]:
         return pictures(figures, CAPTIONS, names)
 
     sections = [Section("Inputs", [], tables.input_tables(suspension))]
@@ -151,12 +151,12 @@ def page(results: Collected, figures: Mapping[str, bytes]) -> str:
             f"{low:.3f} to {high:.3f} kN."
         )
         designed = [tables.design_table(suspension, results.design)]
-        sections.append(Section("Design", [text], designed, shown("coils")))
+        sections.append(Section("Design", [text], designed, drawings("coils")))
     cases = [tables.load_table(suspension), tables.case_table(verification)]
     listed = [tables.sheet_table(sheets), tables.loaded_table(sheets)]
     told = [] if suspension.fatigue else [tables.NO_FATIGUE]
     sections += [
-        Section("Load cases", [], cases, shown("stiffness", "deflection", "arm")),
+        Section("Load cases", [], cases, drawings("stiffness", "deflection", "arm")),
         Section("Checks", told, [check_table(verification.checks, notes=True)]),
         Section("Data sheets of the springs", [SHEETS], listed),
     ]
@@ -167,11 +167,11 @@ def page(results: Collected, figures: Mapping[str, bytes]) -> str:
             "stresses with the factor for the curvature of the wire and the lateral load."
         )
         rows = [tables.fatigue_table(results.fatigue)]
-        sections.append(Section("Fatigue", [text], rows, shown("goodman_smith")))
+        sections.append(Section("Fatigue", [text], rows, drawings("goodman_smith")))
     if results.ride_heights is not None:
         rows = [tables.ride_height_table(results.ride_heights)]
         title = "Scatter of the ride height"
-        sections.append(Section(title, [SCATTER], rows, shown("ride_height")))
+        sections.append(Section(title, [SCATTER], rows, drawings("ride_height")))
     if (found := results.search) is not None:
         text = (
             f"{found.tried} nests tried, {found.feasible} of them within all limits before "
@@ -179,7 +179,7 @@ def page(results: Collected, figures: Mapping[str, bytes]) -> str:
             "sizes; the limits listed are those active at each optimum."
         )
         rows = [tables.search_table(found)]
-        sections.append(Section("Feasible nests", [text], rows, shown("search")))
+        sections.append(Section("Feasible nests", [text], rows, drawings("search")))
     method = [*METHOD, FORMS[suspension.arm.equilibrium], *results.remarks]
     title = f"Primary suspension: {suspension.name}"
-    return of_design(title, suspension.source, verification.checks, sections, method)
+    return design_page(title, suspension.source, verification.checks, sections, method)

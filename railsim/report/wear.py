@@ -33,10 +33,10 @@ def shares_of(runs: Sequence[dict[str, Any]]) -> str:
     )
 
 
-def wear_tables(of: Worn, rows: Rows) -> list[Table]:
+def wear_tables(worn: Worn, rows: Rows) -> list[Table]:
     """Return the table of each profile, one row for each step; a depth shown as 0 has no place."""
     columns = [
-        Column("distance", of.amount, of.unit, "g"),
+        Column("distance", worn.amount, worn.unit, "g"),
         Column("area", "worn area", "mm2", ".4f"),
         deepest := Column("deepest", "", "mm", ".4f"),
         Column("deepest_y", "at y", "mm", ".1f"),
@@ -46,11 +46,11 @@ def wear_tables(of: Worn, rows: Rows) -> list[Table]:
         Column("hollow", "hollow", "mm", ".2f"),
     ]
     tables = []
-    for side, of_side in rows.items():
-        known = [column for column in columns if column.name in of_side[0]]
-        of_side = [
+    for side, steps in rows.items():
+        present = [column for column in columns if column.name in steps[0]]
+        steps = [
             row if float(deepest.text(row["deepest"])) else row | {"deepest_y": None}
-            for row in of_side
+            for row in steps
         ]
-        tables.append(Table(known, of_side, "" if side == "rows" else f"{side} rail"))
+        tables.append(Table(present, steps, "" if side == "rows" else f"{side} rail"))
     return tables

@@ -505,7 +505,7 @@ def unit_stated(label):
 
 def test_every_axis_of_every_picture_says_its_unit():
     from railsim.mechanisms.analysis import analyse
-    from railsim.report.mechanisms import Collected, figures
+    from railsim.report.mechanisms import PageResults, figures
 
     one, two, cam = (
         analyse(load_mechanism(name, ["sampling.points=51"]))
@@ -513,8 +513,8 @@ def test_every_axis_of_every_picture_says_its_unit():
     )
     full = analyse(load_mechanism("tilting_two_springs", ["sampling.points=51"]), "bordolese_5000")
     collections = [
-        Collected([cam, one], {}, None),
-        Collected([two], {"base": two, "bordolese_5000": full}),
+        PageResults([cam, one], {}, None),
+        PageResults([two], {"base": two, "bordolese_5000": full}),
     ]
     seen = set()
     for collected in collections:

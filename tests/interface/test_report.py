@@ -32,17 +32,17 @@ from railsim.report.curves import (
     MISSING,
     MOST_VALUES,
     cells_of,
-    coded,
     curve_data,
+    encode,
     groups,
     thinned,
 )
 from railsim.report.document import Drawing, Section, day
 from railsim.report.drawings import track_svg
-from railsim.report.inputs import _settings, inputs_of, what_was_run
-from railsim.report.limits import assessed
+from railsim.report.inputs import _settings, inputs_of, inputs_section
+from railsim.report.limits import assess_runs
 from railsim.report.measured import Part, as_section
-from railsim.report.published import beside_published, reading
+from railsim.report.published import published_comparisons, reading
 from railsim.report.runs import _lead, _peaks, page
 from railsim.report.spread import columns, command, parameters, spread_rows, worst_rows, worst_runs
 from railsim.result import Hdf5Sink, peaks
@@ -385,7 +385,7 @@ def test_values_are_told_in_words():
     assert day("2026-11-03T15:04:20+00:00") == "3 November 2026, 15:04"
     assert in_words(((10, 10), None, True)) == "10, 10, none, yes"
     grid = {"vehicle.primary.stiffness.x": ["16e6", "2e-5"], "track.rail": ["60E1", "54E1"]}
-    rows = what_was_run([], {}, {"grid": grid}).tables[0].rows
+    rows = inputs_section([], {}, {"grid": grid}).tables[0].rows
     assert [words for _, words in rows] == ["16000000, 2e-05", "60E1, 54E1"]
     assert in_words(16e6) == "16000000"
     rails = parameters([{"labels": {"track.rail": rail}} for rail in ("60E1", "54E1")])
@@ -470,14 +470,14 @@ def test_friction_beside_a_drawn_track_is_that_of_its_left_and_right_rail():
     """Of 0.35 left and 0.15 right "0.15, 0.35" was told."""
     (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": example_result()})
     wet = [used.track.model_copy(update={"friction": one}) for one in ((0.35, 0.15), (0.4, 0.4))]
-    section = what_was_run([used._replace(track=track) for track in wet], {}, {})
+    section = inputs_section([used._replace(track=track) for track in wet], {}, {})
     assert "Friction 0.35 / 0.15, 0.4; rails" in section.drawings[-1].words
 
 
 def test_remarks_on_a_track_stand_beside_its_drawing_and_names_once():
     result = example_result()
     (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": result})
-    coach, curve = what_was_run([used], {"a": result}, {}).drawings
+    coach, curve = inputs_section([used], {"a": result}, {}).drawings
     assert curve.words == (
         "Friction 0.4; rails elastic (ballasted). Remarks: plan.2: a cant of 150 mm is more than "
         "(R - 100 m)/2 = 75 mm."
@@ -492,7 +492,7 @@ def test_assumptions_are_those_of_all_runs_of_a_vehicle_on_a_track():
         used._replace(track=used.track.model_copy(update={"friction": (mu, mu)}))
         for mu in (0.3, 0.35, 0.45)
     ]
-    (table,) = (t for t in what_was_run(runs, {}, {}).tables if t.caption == "Assumptions")
+    (table,) = (t for t in inputs_section(runs, {}, {}).tables if t.caption == "Assumptions")
     cells = {row[0]: row[1] for row in table.rows}
     assert table.header == ["", "all runs"]
     for mu in ("0.4", "0.3", "0.35"):
@@ -504,7 +504,7 @@ def test_assumptions_are_those_of_all_runs_of_a_vehicle_on_a_track():
 def test_assumptions_without_results_are_not_said_to_be_of_all_runs():
     """The files tell those of the first run of each pair, whatever else was varied."""
     (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": example_result()})
-    section = what_was_run([used], {}, {"grid": {"track.friction": ["0.4", "0.1"]}})
+    section = inputs_section([used], {}, {"grid": {"track.friction": ["0.4", "0.1"]}})
     assert "of the first run of each vehicle on each track" in section.texts[0]
     (table,) = (t for t in section.tables if t.caption == "Assumptions")
     assert table.header == ["", "first runs"]
@@ -533,7 +533,7 @@ def test_assumptions_of_more_vehicles_on_tracks_than_are_shown_are_counted():
     (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": result})
     runs = [used._replace(track_label=f"track {k}") for k in range(6)]
     runs[5] = runs[5]._replace(track=used.track.model_copy(update={"friction": (0.1, 0.1)}))
-    (table,) = (t for t in what_was_run(runs, {}, {}).tables if t.caption == "Assumptions")
+    (table,) = (t for t in inputs_section(runs, {}, {}).tables if t.caption == "Assumptions")
     assert len(table.header) == 5  # not "all runs"
     assert table.note == "2 more vehicles on tracks."
 
@@ -558,7 +558,7 @@ def test_peaks_of_low_passed_outputs_are_not_said_to_be_of_all_steps():
 
 
 def test_reasons_of_all_verdicts_are_told_once_and_points_below_a_body_are_below():
-    found = assessed({"run": example_result()})[1]
+    found = assess_runs({"run": example_result()})[1]
     verdicts = next(table for table in found.tables if table.caption.startswith("Verdicts"))
     reasons = [row[2] for row in verdicts.rows]
     assert len(reasons) == len(set(reasons))
@@ -574,10 +574,10 @@ def test_reasons_of_all_verdicts_are_told_once_and_points_below_a_body_are_below
 def test_a_run_without_forces_leaves_its_vehicle_without_a_verdict_and_that_is_said():
     whole = example_result()
     part = selected(whole, ["Q"])
-    verdicts, _ = assessed({"whole": whole, "part": part})
+    verdicts, _ = assess_runs({"whole": whole, "part": part})
     words = "not assessed to EN 14363; the remarks on these values say why."
     assert [text for _, text in verdicts] == [f"{whole.vehicle().name}: {words}"]
-    assert assessed({"part": part})[0] == []  # kept without forces: nothing was to be assessed
+    assert assess_runs({"part": part})[0] == []  # kept without forces: nothing was to be assessed
 
 
 def test_values_that_do_not_exist_are_no_nan_on_the_page():
@@ -610,7 +610,7 @@ def test_cells_without_an_instant_are_interpolated_and_none_is_made_up_beyond_th
 
 def test_coded_values_are_right_to_half_a_step():
     values = np.array([[-3.0, 0.1, np.nan, 8.0]])
-    low, high, text = coded(values)
+    low, high, text = encode(values)
     codes = np.frombuffer(base64.b64decode(text), "<u2")
     assert codes[2] == MISSING
     back = low + codes[[0, 1, 3]] * (high - low) / (MISSING - 1)
@@ -798,7 +798,7 @@ def test_failures_and_remarks_are_told_and_names_are_shown_literally():
 
 def test_published_values_stand_beside_the_run_they_belong_to():
     result = example_result()
-    rows = {row.value.quantity: row for row in beside_published({"a": result})}
+    rows = {row.value.quantity: row for row in published_comparisons({"a": result})}
     assert set(rows) == {"dQ_over_Q0", "sum_abs_Y", "Y_over_Q", "wheelset_roll", "wheelset_yaw",
                          "wheelset_lateral"}  # fmt: skip
     largest = result.dQ_over_Q0[:, 0, 0].max()
@@ -806,7 +806,7 @@ def test_published_values_stand_beside_the_run_they_belong_to():
     assert rows["dQ_over_Q0"].difference == pytest.approx(largest / 0.3792 - 1.0)
     instant = int(np.argmin(np.abs(result.time - 19.8)))
     assert rows["wheelset_yaw"].found == result.wheelset_yaw[instant, 0]
-    assert beside_published({"a": example_result(speed=19.0)}) == []
+    assert published_comparisons({"a": example_result(speed=19.0)}) == []
     value = rows["wheelset_yaw"].value
     assert reading(example_result(duration=10.0), value) is None
 
@@ -930,7 +930,7 @@ def test_assessments_of_two_vehicles_of_one_name_stand_side_by_side():
 
     for forces in ((80e3, 10e3), (10e3, 80e3)):
         runs = dict(zip("ab", map(pushed, forces, texts), strict=True))
-        _, section = assessed(runs)
+        _, section = assess_runs(runs)
         zone = next(table for table in section.tables if "zone 4" in table.caption)
         assert [name[-3:] for name in zone.header[1:3]] == ["(a)", "(b)"]
         quotient = next(k for k, row in enumerate(zone.rows) if "quotient" in row[0][0])
@@ -944,7 +944,7 @@ def test_assessments_of_a_grid_are_told_apart_by_its_values():
     path = "bodies.carbody.mass"
     texts = [coach.with_values({path: mass}).to_toml() for mass in (40e3, 41e3)]
     runs = {f"run{k}": made(on, 23.0, vehicle=text) for k, text in enumerate(texts)}
-    _, section = assessed(runs)
+    _, section = assess_runs(runs)
     zone = next(table for table in section.tables if "zone 4" in table.caption)
     assert [name[-20:] for name in zone.header[1:3]] == [
         f"(carbody mass {m})" for m in (40000, 41000)

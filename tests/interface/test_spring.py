@@ -10,7 +10,7 @@ from railsim import cli
 from railsim.definitions.loading import load_spring, load_vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.files.sources import library_files
-from railsim.report.springs import collected, page
+from railsim.report.springs import compute, page
 
 MINIMAL = """
 format = "railsim-spring/1"
@@ -241,7 +241,7 @@ def test_pages_are_self_contained(folder):
 
 def test_page_says_what_is_not_met():
     change = ["material.tau_allowable=700e6", "target.load=90e3"]
-    found = page(collected(load_spring("turasas_axlebox", change)), {})
+    found = page(compute(load_spring("turasas_axlebox", change)), {})
     assert "Not met: yield_outer, yield_inner." in found
     assert "has no physical solution" in found
 
@@ -250,7 +250,7 @@ def test_fatigue_that_nothing_is_known_of_is_said_to_be_open(capsys):
     """`All 9 checks are met` is not the whole strength of a spring."""
     assert cli.main(["spring", "verify", "tare_laden_example"]) == 0
     assert "Fatigue is not assessed" in capsys.readouterr().out
-    assert "Fatigue is not assessed" in page(collected(load_spring("tare_laden_example")), {})
+    assert "Fatigue is not assessed" in page(compute(load_spring("tare_laden_example")), {})
 
 
 def test_existing_pages_are_kept_without_overwrite_and_the_same_every_time(

@@ -18,7 +18,7 @@ from railsim.assessment.verdict import all_verdicts
 from railsim.cli import main
 from railsim.errors import InputError
 from railsim.profiles import load_profile
-from railsim.report.limits import assessed
+from railsim.report.limits import assess_runs
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
 FAST = 1.1 * 33.33333
@@ -112,7 +112,7 @@ def test_wheel_above_nadals_limit_before_it_lifts_is_said_to_exceed_it():
     assert wheel.limit < 1.2
     assert wheel.climb_distance == pytest.approx(12.0, abs=0.1)
     assert not any(other.lifted for other in others)
-    verdicts, page = assessed({"run": run, "again": run})
+    verdicts, page = assess_runs({"run": run, "again": run})
     above = "; ".join(f"{name}: Nadal's limit, wheelset 1 left" for name in ("run", "again"))
     assert ("failed", f"Limits exceeded: {above}.") in verdicts
     table = next(t for t in page.tables if t.caption.startswith("Derailment"))

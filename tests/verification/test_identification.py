@@ -22,7 +22,7 @@ from railsim.identification.problem import Problem, Workers
 from railsim.identification.residuals import Form, whiteness
 from railsim.identification.runs import model_of, prepared, simulated_run
 from railsim.profiles import load_profile
-from railsim.report.measured import of_identification
+from railsim.report.measured import identification_part
 
 SPEED, LENGTH, RATE = 20.0, 170.0, 200.0
 PRIMARY, DAMPER = "primary.stiffness.z", "primary.damping.z"
@@ -404,7 +404,7 @@ def test_a_bound_that_keeps_the_value_out_is_said(found, low):
                            workers=1)  # fmt: skip
     assert one.factors[0] == pytest.approx(low, rel=1e-3)
     assert one.remarks[0].startswith(f"{PRIMARY} ends at its bound of {low}")
-    part = of_identification({**one.record(), "channels": []}, [])
+    part = identification_part({**one.record(), "channels": []}, [])
     assert part.verdict == one.remarks[0]  # and not "All parameters are identified"
     assert not part.ok
     assert one.remarks[0] not in part.remarks  # said once
