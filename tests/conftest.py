@@ -155,7 +155,7 @@ def empty_pictures():
     """Pictures are empty files: a second each where a test looks at other files only."""
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("railsim.plot.style.drawn", lambda *_: b"")
+        patch.setattr("railsim.plot.style.to_bytes", lambda *_: b"")
         yield
 
 

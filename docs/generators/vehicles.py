@@ -384,7 +384,7 @@ def curve_figure(result: railsim.Result, track: Track) -> Picture:
         for axes in (force, moved):
             axes.set_xlabel("$s$ (m)")
             axes.margins(x=0.0)
-            shade(axes, spans(curvature_sections(track), s[shown], s[shown]), named=True)
+            shade(axes, spans(curvature_sections(track), s[shown], s[shown]), with_names=True)
         for axes in (force, moved):
             axes.legend(fontsize=7, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.2))
         return figure

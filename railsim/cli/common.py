@@ -440,9 +440,9 @@ def _bytes(content: Any) -> bytes:
     if isinstance(content, bytes):
         return content
     if hasattr(content, "savefig"):
-        from railsim.plot.style import drawn
+        from railsim.plot.style import to_bytes
 
-        return drawn(content)
+        return to_bytes(content)
     if isinstance(content, Table):
         content = content.csv()
     elif not isinstance(content, str):

@@ -17,7 +17,7 @@ from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits
 from railsim.errors import input_error
-from railsim.plot.style import BESIDE, DISTINCT, LIMIT, Picture, broken, distinct, key, note, styled
+from railsim.plot.style import BESIDE, DISTINCT, LIMIT, Picture, distinct, key, note, styled, wrap
 from railsim.text import unformatted
 
 LEAST_SPEEDS = 3  # for curves over the speed
@@ -85,7 +85,7 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
 def _verdicts(assessment: Assessment, figure: Figure) -> str:
     parts = [f"{WORDS[name]} {verdict.value}" for name, verdict in assessment.verdicts.items()]
     lines = f"{assessment.vehicle}: {assessment.verdict}", ", ".join(parts)
-    return "\n".join(broken(line, figure.get_figwidth() - 0.5) for line in lines)
+    return "\n".join(wrap(line, figure.get_figwidth() - 0.5) for line in lines)
 
 
 @styled()
@@ -128,7 +128,7 @@ def _by_zone(
     grid = figure.subplots(len(assessments), len(zones), squeeze=False, **how)
     for axes, assessment in zip(grid, assessments, strict=True):
         # above the zones, and as wide as all of them: those of the zones make room for it
-        name = broken(assessment.vehicle, figure.get_figwidth() - 0.6)
+        name = wrap(assessment.vehicle, figure.get_figwidth() - 0.6)
         axes[0].set_title(f"{name}\n", loc="left", fontsize=9).set_in_layout(False)
         for ax, zone in zip(axes, zones, strict=True):
             ax.set_title("\n" * (name.count("\n") + 1) + f"zone {zone}", loc="right", fontsize=9)

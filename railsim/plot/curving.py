@@ -59,18 +59,18 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     return figure
 
 
-def _leading_outer(found: Curving, values: Floats) -> Floats:
+def _leading_outer(curving: Curving, values: Floats) -> Floats:
     """Values of the leading wheelset's outer wheel, float64[radius, deficiency, friction]."""
-    outer = np.where(found.radius > 0.0, LEFT, RIGHT)[:, None, None, None]
+    outer = np.where(curving.radius > 0.0, LEFT, RIGHT)[:, None, None, None]
     own: Floats = np.take_along_axis(values[:, :, :, 0, :], outer, axis=-1)[..., 0]
     return own
 
 
-def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
+def _wear_maps(figure: SubFigure, curving: Curving, order: Indices) -> None:
     """Wear number of the leading outer wheel over radius and cant deficiency for each friction."""
-    number = min(len(found.friction), MAPS)
-    radius, deficiency = found.radius[order], 1e3 * found.cant_deficiency
-    wear = _leading_outer(found, found.T_gamma)[order]
+    number = min(len(curving.friction), MAPS)
+    radius, deficiency = curving.radius[order], 1e3 * curving.cant_deficiency
+    wear = _leading_outer(curving, curving.T_gamma)[order]
     largest = float(np.nanmax(wear)) if np.isfinite(wear).any() else 1.0
     columns, rows = np.arange(len(radius)), np.arange(len(deficiency))
     for m, axes in enumerate(figure.subplots(1, number, squeeze=False)[0]):
@@ -86,7 +86,7 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
             words = signed(round(value)) if known else "none"
             note(axes, words, (r, i), (0, 0), "center", "center", color=colour)
         axes.set(xlabel="radius (m)", ylabel="cant deficiency (mm)" if m == 0 else "")
-        axes.set(title=rf"$T\gamma$ (N), leading outer wheel, friction {found.friction[m]:g}")
+        axes.set(title=rf"$T\gamma$ (N), leading outer wheel, friction {curving.friction[m]:g}")
     figure.colorbar(picture, ax=figure.axes, label=r"$T\gamma$ (N)", fraction=0.03)
 
 
@@ -96,26 +96,26 @@ def _ticks(radius: Floats) -> list[float]:
     return [step for step in steps if 0.9 * np.min(radius) <= step <= 1.1 * np.max(radius)]
 
 
-def _lines(axes: Axes, found: Curving, order: Indices, values: Floats, words: str) -> None:
+def _lines(axes: Axes, curving: Curving, order: Indices, values: Floats, words: str) -> None:
     """Values over radius; friction by colour, cant deficiency by line."""
-    radius = found.radius[order]
+    radius = curving.radius[order]
     styles: list[Any] = ["-", (0, (4, 2)), (0, (1, 1.5)), (0, (4, 1.5, 1, 1.5))]
-    for m, mu in enumerate(found.friction):
-        for i, deficiency in enumerate(found.cant_deficiency):
-            shown = np.where(found.converged[:, i, m] > 0, values[:, i, m], np.nan)[order]
+    for m, mu in enumerate(curving.friction):
+        for i, deficiency in enumerate(curving.cant_deficiency):
+            shown = np.where(curving.converged[:, i, m] > 0, values[:, i, m], np.nan)[order]
             label = f"friction {mu:g}, cant deficiency {1e3 * deficiency:g} mm"
             colour, line = distinct(m), styles[i % len(styles)]
-            both = _parted(radius, shown)
+            both = _split_hands(radius, shown)
             axes.plot(*both, ls=line, color=colour, marker=".", ms=4, label=label)
             for code, marker in ((TIME, "o"), (MEAN, "x")):
-                those = found.converged[:, i, m][order] == code
+                those = curving.converged[:, i, m][order] == code
                 how = METHODS[code] if those.any() else None
                 marked = radius[those], shown[those], marker
                 axes.plot(*marked, color=colour, ms=6, mfc="none", label=how)
     axes.set_title(words)
 
 
-def _parted(radius: Floats, values: Floats) -> tuple[Floats, Floats]:
+def _split_hands(radius: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Left-hand curves, then right-hand ones: no line joins them over a radius of zero."""
     between = int(np.searchsorted(radius, 0.0))
     if between in (0, len(radius)):
@@ -123,20 +123,20 @@ def _parted(radius: Floats, values: Floats) -> tuple[Floats, Floats]:
     return np.insert(radius, between, np.nan), np.insert(values, between, np.nan)
 
 
-def _plan(axes: Axes, found: Curving) -> None:
+def _plan(axes: Axes, curving: Curving) -> None:
     """Wheelsets on the unrolled track in the tightest curve, seen from above."""
-    there = found.converged[:, 0, 0] > 0
+    there = curving.converged[:, 0, 0] > 0
     if not there.any():
         say(axes, "no values at any radius for the first deficiency and friction")
         return
-    r = int(np.argmin(np.where(there, np.abs(found.radius), np.inf)))
-    x = np.array(found.wheelset_position)
+    r = int(np.argmin(np.where(there, np.abs(curving.radius), np.inf)))
+    x = np.array(curving.wheelset_position)
     for y in (-HALF, HALF):
         axes.axhline(y, color="0.75", lw=2.5, zorder=1)
-    looks = wheelset_looks(found.wheelsets)
-    for w, name in enumerate(found.wheelsets):
-        yaw = EXAGGERATED * found.attack[r, 0, 0, w]
-        middle = np.array([x[w], EXAGGERATED * found.lateral[r, 0, 0, w]])
+    looks = wheelset_looks(curving.wheelsets)
+    for w, name in enumerate(curving.wheelsets):
+        yaw = EXAGGERATED * curving.attack[r, 0, 0, w]
+        middle = np.array([x[w], EXAGGERATED * curving.lateral[r, 0, 0, w]])
         along, across = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
         ends = [middle - HALF * across, middle + HALF * across]
         axes.plot(*np.transpose(ends), color=looks[name]["color"], lw=1.6, zorder=2)
@@ -147,21 +147,21 @@ def _plan(axes: Axes, found: Curving) -> None:
     axes.set(xlim=(np.min(x) - 2.0, np.max(x) + 2.0), ylim=(1.9, -1.9), aspect="equal")
     axes.set(xticks=[], yticks=[], anchor="W")  # room for the title of a short vehicle
     axes.set_title(
-        f"Wheelsets at R {signed(found.radius[r])} m, {_first(found)}, from above, running to the "
-        f"right; angles and displacements magnified {EXAGGERATED:g} times"
+        f"Wheelsets at R {signed(curving.radius[r])} m, {_case_text(curving)}, from above, "
+        f"running to the right; angles and displacements magnified {EXAGGERATED:g} times"
     )
 
 
-def _first(found: Curving) -> str:
+def _case_text(state: Curving) -> str:
     """Friction and cant deficiency of what is shown for one of them alone."""
-    return f"friction {found.friction[0]:g}, cant deficiency {1e3 * found.cant_deficiency[0]:g} mm"
+    return f"friction {state.friction[0]:g}, cant deficiency {1e3 * state.cant_deficiency[0]:g} mm"
 
 
-def _steering(axes: Axes, found: Curving, order: Indices) -> None:
+def _steering(axes: Axes, curving: Curving, order: Indices) -> None:
     """How all wheelsets stand in the curve at the first cant deficiency and friction."""
-    looks = wheelset_looks(found.wheelsets)
-    for w, name in enumerate(found.wheelsets):
-        both = _parted(found.radius[order], 1e3 * found.lateral[order, 0, 0, w])
+    looks = wheelset_looks(curving.wheelsets)
+    for w, name in enumerate(curving.wheelsets):
+        both = _split_hands(curving.radius[order], 1e3 * curving.lateral[order, 0, 0, w])
         axes.plot(*both, ms=4, label=name, **looks[name])
-    axes.set_title(f"lateral displacement (mm), {_first(found)}")
+    axes.set_title(f"lateral displacement (mm), {_case_text(curving)}")
     axes.legend(fontsize=7.5)

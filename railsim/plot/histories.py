@@ -105,7 +105,7 @@ def _figure(
                 axes[i, j].remove()
                 continue
             _draw(axes[i, j], result, panel, horizontal, by, window)
-            style.shade(axes[i, j], shown, named=i == 0)
+            style.shade(axes[i, j], shown, with_names=i == 0)
             axes[i, j].tick_params(labelleft=by == "wheel" or not any(row[:j]))
             if not (i + 1 < rows and grid[i + 1][j] is not None):
                 axes[i, j].set_xlabel(result.quantities[over].label)
@@ -204,9 +204,9 @@ def draw_limit(axes: Axes, quantity: Quantity, results: Iterable[Result]) -> Non
     style.note(axes, words, (1.0, shown), shift, "right", va, frame=style.BESIDE, **look)
 
 
-def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:
+def _legend(result: Result, panels: Sequence[Panel], by: str) -> list[Line2D]:
     """Return the keys of all axes together: colours of the wheelsets, lines of the sides."""
-    lines = [line for panel in drawn for line in panel.lines]
+    lines = [line for panel in panels for line in panel.lines]
     handles = []
     if by == "wheel":
         looks = style.wheelset_looks(result.wheelsets)

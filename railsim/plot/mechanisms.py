@@ -147,10 +147,10 @@ def drawing_figure(result: Analysis) -> Figure:
     return figure
 
 
-def draw(axes: Axes, drawn: Sequence[Line], k: int, colour: str, label: str) -> list[Line2D]:
+def draw(axes: Axes, lines: Sequence[Line], k: int, colour: str, label: str) -> list[Line2D]:
     """Draw the lines of a mechanism at one of its positions [mm]."""
     made = []
-    for i, line in enumerate(drawn):
+    for i, line in enumerate(lines):
         look: Any = {"lw": WIDTHS[line.kind], "ms": 2.5, "ls": STYLES.get(line.kind, "-")}
         look |= {"marker": "o" if line.kind in ("body", "link") else "", "color": colour}
         look |= {"solid_capstyle": "round", "label": label if i == 0 else None}

@@ -50,7 +50,7 @@ def overlay(
     shown = style.spans(plans[0], longest["distance"], longest[over]) if alike else []
     same_radii = all(plan == plans[0] for plan in plans)
     count, words = max(map(len, drawn.values())), first.quantities[over].label
-    title = _shared(list(results.values()))
+    title = _shared_title(list(results.values()))
     figure, cells, across = _cells(count, 1.5 if title else 1.3, words, title)
     together = zip_longest(*drawn.values())
     places = {  # wheelsets as in the legends of histories: number and name
@@ -68,7 +68,7 @@ def overlay(
         quantity = held[0].quantity
         draw_limit(axes, quantity, results.values())
         frame(axes, quantity, _heading(held, places))
-        style.shade(axes, shown, named=same_radii and number < across)
+        style.shade(axes, shown, with_names=same_radii and number < across)
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]
     labels = [f"{label}{result.end_words}" for label, result in results.items()]
     _legend(figure, labels, {line.labels.get("side") for line in lines}, 0)
@@ -129,24 +129,24 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
     return figure
 
 
-def _shared(results: Sequence[Result]) -> str:
+def _shared_title(results: Sequence[Result]) -> str:
     """What of vehicle, track, friction and speed is the same for all results."""
     tracks, several = [run.track() for run in results], len({r.vehicle().name for r in results}) > 1
-    told = (
+    texts = (
         [run.vehicle().name_with_load for run in results],
         [f"load case {run.vehicle().load}" for run in results if several and run.vehicle().load],
         [track.name for track in tracks],
         [f"friction {track.friction_words}" for track in tracks],
         [run.speed_words for run in results],
     )  # fmt: skip
-    same = [names[0] for names in told if len(names) == len(results) and len(set(names)) == 1]
+    same = [names[0] for names in texts if len(names) == len(results) and len(set(names)) == 1]
     return " · ".join(map(unformatted, same))
 
 
-def _heading(held: Sequence[Panel], names: Mapping[str, str]) -> str:
+def _heading(panels: Sequence[Panel], names: Mapping[str, str]) -> str:
     """Name of a quantity, with the place that all lines of a result share."""
-    quantity, places = held[0].quantity, dict[str, None]()
-    for panel in held:
+    quantity, places = panels[0].quantity, dict[str, None]()
+    for panel in panels:
         labels = {v for line in panel.lines for dim, v in line.labels.items() if dim != "side"}
         labels -= {quantity.long_name.rpartition(", ")[2]}
         if len(labels) != 1:

@@ -18,30 +18,30 @@ LEADER = 10.0  # distance from which a thin line joins name and point [points]
 LINE = {"arrowstyle": "-", "lw": 0.5, "color": "0.4", "shrinkA": 0.0, "shrinkB": 2.0}
 
 
-def name_points(axes: Axes, named: Mapping[str, Floats], drawn: Sequence[Floats]) -> None:
+def name_points(axes: Axes, points: Mapping[str, Floats], lines: Sequence[Floats]) -> None:
     """Write names beside points.
 
-    `axes`: With its limits as they stay. `named` (shape (2,)): Points by their names, in data.
-    `drawn` (shape (point, 2)): Lines that are better not covered, in data.
+    `axes`: With its limits as they stay. `points` (shape (2,)): Points by their names, in data.
+    `lines` (shape (point, 2)): Lines that are better not covered, in data.
     """
     figure: Any = axes.figure
     figure.draw_without_rendering()  # the layout settles, and with it the scale
     per_point = figure.dpi / 72.0
     frame = np.array(axes.get_window_extent().extents) / per_point
-    at = {name: axes.transData.transform(xy) / per_point for name, xy in named.items()}
-    ink = np.concatenate([_along(axes.transData.transform(xy) / per_point) for xy in drawn])
-    marks = np.array(list(at.values()))
+    places = {name: axes.transData.transform(xy) / per_point for name, xy in points.items()}
+    ink = np.concatenate([_along(axes.transData.transform(xy) / per_point) for xy in lines])
+    marks = np.array(list(places.values()))
     boxes: list[Floats] = []
-    for name, point in at.items():
-        found = [
+    for name, point in places.items():
+        costs = [
             (_cost(box, boxes, frame, ink, marks) + 0.15 * reach, k, offset, box)
             for k, (reach, offset, box) in enumerate(_candidates(name, point))
         ]
-        _, _, offset, box = min(found, key=lambda one: one[:2])
+        _, _, offset, box = min(costs, key=lambda cost: cost[:2])
         boxes.append(box)
         far = np.hypot(*offset) > LEADER + 0.29 * SIZE * len(name)
         look: Any = {"fontsize": SIZE, "color": "k", "arrowprops": LINE if far else None}
-        note(axes, name, named[name], offset, "center", "center", **look).set_in_layout(False)
+        note(axes, name, points[name], offset, "center", "center", **look).set_in_layout(False)
 
 
 def _along(line: Floats) -> Floats:

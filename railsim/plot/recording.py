@@ -48,7 +48,7 @@ def recording_figure(before: Floats, after: Floats, title: str) -> Figure:
             _spectrum(density, rows, of, look)
         over.set(title=f"{words}{_deviations(after, of)}", ylabel=f"${symbol}$ (mm)")
         over.margins(x=0.0)
-        _beside(density, channel)
+        _draw_erri(density, channel)
     grid[-1, 0].set_xlabel("$s$ (m)")
     grid[-1, 1].set(xlabel="wavelength (m)", xlim=WAVELENGTHS[::-1])
     handles, labels = grid[0, 0].get_legend_handles_labels()
@@ -57,15 +57,15 @@ def recording_figure(before: Floats, after: Floats, title: str) -> Figure:
     return figure
 
 
-def _even(rows: Floats, of: Callable[[Floats], Floats]) -> tuple[Floats, float]:
+def _even(rows: Floats, channel: Callable[[Floats], Floats]) -> tuple[Floats, float]:
     """Values at equal steps, and the step [m]."""
     step = float(np.mean(np.diff(rows[:, 0])))
     s = rows[0, 0] + step * np.arange(len(rows))
-    return np.interp(s, rows[:, 0], of(rows[:, 1:].T)), step
+    return np.interp(s, rows[:, 0], channel(rows[:, 1:].T)), step
 
 
-def _deviations(rows: Floats, of: Callable[[Floats], Floats]) -> str:
-    values, step = _even(rows, of)
+def _deviations(rows: Floats, channel: Callable[[Floats], Floats]) -> str:
+    values, step = _even(rows, channel)
     parts = []
     for name in ("D1", "D2"):
         if step * len(values) > 3.0 * BANDS[name][1] and 2.0 * step < BANDS[name][0]:
@@ -75,9 +75,9 @@ def _deviations(rows: Floats, of: Callable[[Floats], Floats]) -> str:
 
 
 def _spectrum(
-    axes: Axes, rows: Floats, of: Callable[[Floats], Floats], look: dict[str, object]
+    axes: Axes, rows: Floats, channel: Callable[[Floats], Floats], look: dict[str, object]
 ) -> None:
-    values, step = _even(rows, of)
+    values, step = _even(rows, channel)
     size = max(8, min(round(LONGEST / step), 2 * len(values) // (SEGMENTS + 1)))
     if len(values) < size:
         return
@@ -86,7 +86,7 @@ def _spectrum(
     axes.plot(1.0 / f[shown], 1e6 * S[shown], **look)  # type: ignore[arg-type]
 
 
-def _beside(axes: Axes, channel: str) -> None:
+def _draw_erri(axes: Axes, channel: str) -> None:
     """The spectra of ERRI B176 between their wavelengths of 3 and 70 m."""
     wavelength = np.geomspace(3.0, 70.0, 80)
     for name, (colour, line) in ERRI.items():

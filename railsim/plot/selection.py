@@ -72,29 +72,29 @@ def _panels(result: Result, selection: str) -> Iterator[Panel]:
     if name not in drawable:
         raise _fault(selection, f"no quantity '{name}'", nearest(name, drawable))
     quantity = result.quantities[name]
-    wanted = _wanted(result, quantity, selection, labels)
+    chosen = _chosen_labels(result, quantity, selection, labels)
     per_panel = ["component"] if "component" in quantity.dims else []
     per_line = [dim for dim in quantity.dims[1:] if dim not in per_panel]
-    lines = list(product(*(wanted[dim] for dim in per_line)))
+    lines = list(product(*(chosen[dim] for dim in per_line)))
     if len(lines) > MOST_LINES:
-        example = ":".join((name, *(wanted[dim][0] for dim in per_line)))
+        example = ":".join((name, *(chosen[dim][0] for dim in per_line)))
         raise _fault(selection, f"{len(lines)} lines", f"choose some of them, such as {example}")
-    for outer in product(*(wanted[dim] for dim in per_panel)):
+    for outer in product(*(chosen[dim] for dim in per_panel)):
         dims = (*per_panel, *per_line)
         places = [dict(zip(dims, (*outer, *inner), strict=True)) for inner in lines]
-        drawn = tuple(Line(result.series(name, **where), where) for where in places)
-        yield Panel(quantity.component(*outer) if outer else quantity, drawn)
+        series = tuple(Line(result.series(name, **where), where) for where in places)
+        yield Panel(quantity.component(*outer) if outer else quantity, series)
 
 
-def _wanted(
-    result: Result, quantity: Quantity, selection: str, given: list[str]
+def _chosen_labels(
+    result: Result, quantity: Quantity, selection: str, names: list[str]
 ) -> dict[str, list[str]]:
     dims = quantity.dims[1:]
     known = all_labels(dims, result.coordinates)
-    for name in filter(None, given):
+    for name in filter(None, names):
         if name not in known:
             raise _fault(selection, f"no label '{name}'", nearest(name, known))
-    chosen = chosen_names(dims, result.coordinates, [*filter(None, given)])
+    chosen = chosen_names(dims, result.coordinates, [*filter(None, names)])
     return {d: chosen.get(k, list(result.coordinates[d])) for k, d in enumerate(dims)}
 
 

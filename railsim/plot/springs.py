@@ -234,10 +234,10 @@ def _curve(result: Verification) -> dict[str, Floats]:
     }  # fmt: skip
 
 
-def _mark(axes: Axes, result: Verification, over: str, what: str) -> None:
+def _mark(axes: Axes, result: Verification, over: str, quantity: str) -> None:
     """Mark the load cases on a rising curve, their names above and below it in turn."""
     for i, case in enumerate(sorted(result.cases, key=lambda case: getattr(case, over))):
-        point = getattr(case, over) * SCALES[over], getattr(case, what) * SCALES[what]
+        point = getattr(case, over) * SCALES[over], getattr(case, quantity) * SCALES[quantity]
         axes.plot(*point, "o", color=MAIN, ms=4)
         where = ((4, -3), "left", "top") if i % 2 else ((-4, 3), "right", "bottom")
         note(axes, unformatted(case.name), point, *where, **NAMES)

@@ -58,7 +58,7 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
         if limit is not None:
             axes.axhline(scale * limit.limit, color=LIMIT, lw=0.8, ls=(0, (1, 2)), label=words)
     words = f"Hunting, {found.type}" if found.type else "Hunting"
-    upper.set(ylabel="amplitude of the wheelsets (mm)", title=words, xlim=_shown(found))
+    upper.set(ylabel="amplitude of the wheelsets (mm)", title=words, xlim=_speed_range(found))
     upper.set(ylim=(0.0, None))
     lower[0].set(ylabel="frequency (Hz)")
     for axes in lower[1:]:
@@ -74,43 +74,43 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
     return figure
 
 
-def _shown(found: CriticalSpeed) -> tuple[float | None, float | None]:
+def _speed_range(speeds: CriticalSpeed) -> tuple[float | None, float | None]:
     """Range of speeds: from somewhat below the slowest hunting to somewhat above the last jump."""
-    alive = [point.speed for branch in found.branches for point in branch.alive]
+    alive = [point.speed for branch in speeds.branches for point in branch.alive]
     if not alive:
         return None, None
-    marks = [min(alive), *(jump.speed for jump in found.jumps)]
-    if found.linear is not None:
-        marks.append(found.linear.speed)
-    return 0.9 * min(marks), min(found.high, 1.25 * max(marks))
+    marks = [min(alive), *(jump.speed for jump in speeds.jumps)]
+    if speeds.linear is not None:
+        marks.append(speeds.linear.speed)
+    return 0.9 * min(marks), min(speeds.high, 1.25 * max(marks))
 
 
-def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
+def _linear_figure(speeds: CriticalSpeed, title: str) -> Figure:
     """What there is without a branch: linear critical speeds over amplitude, the conicity."""
-    words = f"no linear critical speed from {found.low:g} to {found.high:g} m/s"
-    if found.unstable_at_low:
-        words = f"unstable at {found.low:g} m/s, the lower end of the range"
-    if found.linear is not None:
-        words = f"linear critical speed {found.linear.speed:.2f} m/s ({found.linear.mode})"
+    words = f"no linear critical speed from {speeds.low:g} to {speeds.high:g} m/s"
+    if speeds.unstable_at_low:
+        words = f"unstable at {speeds.low:g} m/s, the lower end of the range"
+    if speeds.linear is not None:
+        words = f"linear critical speed {speeds.linear.speed:.2f} m/s ({speeds.linear.mode})"
     figure = Picture(8.4, 4.4, f"{title}\n{words}")
     left, right = figure.subplots(1, 2, sharey=True)
     left.set(xlabel="speed (m/s)", ylabel="amplitude of the wheelsets (mm)")
     left.set(title="Linear critical speed", ylim=(0.0, SMALL_AMPLITUDES))
-    _mark(left, found)
+    _mark(left, speeds)
     if left.has_data():
         left.legend(fontsize=7.5)
-    if found.conicity_over_amplitude is None:
+    if speeds.conicity_over_amplitude is None:
         say(right, "the wheelset does not fit between the rails")
     else:
-        _conicity(right, found.conicity_over_amplitude)
+        _conicity(right, speeds.conicity_over_amplitude)
     return figure
 
 
-def _mark(axes: Axes, found: CriticalSpeed) -> None:
+def _mark(axes: Axes, critical: CriticalSpeed) -> None:
     """Linear critical speeds as lines, the lowest speeds of sustained hunting as circles."""
-    if (lost := found.linear) is not None:
+    if (lost := critical.linear) is not None:
         lines: list[tuple[str, float | None, Any]] = [
-            (f"linear, {found.contact.words()}", lost.speed, "-"),
+            (f"linear, {critical.contact.words()}", lost.speed, "-"),
             ("the same on rigid rails", lost.speed_on_rigid_rails, (0, (6, 2, 1, 2))),
             ("the same with the cells of the runs", lost.speed_of_runs, (0, (6, 2))),
         ]
@@ -118,14 +118,14 @@ def _mark(axes: Axes, found: CriticalSpeed) -> None:
             if speed is not None:
                 label = f"{words}: {speed:.2f} m/s"
                 axes.axvline(speed, color="0.1", lw=0.9, ls=dashes, label=label)
-    line = found.linear_over_amplitude
+    line = critical.linear_over_amplitude
     if line is not None and line.smallest is not None:
         # not at amplitudes of which the lower end of the range is unstable already
-        speeds = np.array([s if s and s > found.low else np.nan for s in line.speed])
+        speeds = np.array([s if s and s > critical.low else np.nan for s in line.speed])
         sizes = 1e3 * np.array(line.amplitude)
         words = "linear, harmonic, over amplitude"
         axes.plot(speeds, sizes, color="0.1", lw=0.9, ls=":", label=words)
-    for method, lowest in found.nonlinear.items():
+    for method, lowest in critical.nonlinear.items():
         if lowest is not None:
             more = "" if lowest.stable else ", unstable"
             axes.plot(

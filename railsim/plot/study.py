@@ -85,7 +85,7 @@ def curves_figure(
         axes.set(title=quantity.words, xlabel=x.words)
         if not x.numeric:
             axes.set_xticks(range(len(x.different)), [unformatted(str(v)) for v in x.different])
-            _turned(axes)
+            _turn_labels(axes)
     if family is not None:
         handles, labels = cells[0].get_legend_handles_labels()
         longest = max(map(len, labels), default=1)
@@ -95,15 +95,15 @@ def curves_figure(
     return figure
 
 
-def _name_medians(figure: Figure, points: Sequence[Any], more: str = "") -> None:
+def _name_medians(figure: Figure, points: Sequence[Any], ending: str = "") -> None:
     """Say above a picture that it shows medians, where several runs share a point."""
     if len(set(points)) < len(points):
-        say_above(figure, f"Medians of the runs at each point{more}")
+        say_above(figure, f"Medians of the runs at each point{ending}")
 
 
-def say_above(figure: Figure, words: str) -> None:
+def say_above(figure: Figure, text: str) -> None:
     """Add a line above a picture, over those that are there."""
-    lines = "\n".join(filter(None, [words, figure.get_suptitle()]))
+    lines = "\n".join(filter(None, [text, figure.get_suptitle()]))
     figure.suptitle(lines, x=0.012, ha="left", fontsize=8.5, fontweight="normal")
 
 
@@ -158,7 +158,7 @@ def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
             continue
         _draw_map(figure, axes, values, quantity)
         _ticks(axes.set_xticks, columns)
-        _turned(axes)
+        _turn_labels(axes)
         _ticks(axes.set_yticks, rows)
     return figure
 
@@ -183,7 +183,7 @@ def _ticks(tell: Any, values: Sequence[Any]) -> None:
     tell(list(indices), [unformatted(_text(values[index])) for index in indices])
 
 
-def _turned(axes: Axes) -> None:
+def _turn_labels(axes: Axes) -> None:
     """Turn the labels below axes where they would run into each other."""
     if sum(len(label.get_text()) + 2 for label in axes.get_xticklabels()) > WIDE:
         axes.tick_params(axis="x", labelrotation=30)
@@ -261,7 +261,7 @@ def _pair(
     if (~feasible).any():
         axes.plot(*values[~feasible].T, "x", color="0.6", ms=4, label="infeasible")
     # a line joins the front only where it orders it
-    line = "-" if values.shape[1] == 2 and _ordered(values[front]) else ""
+    line = "-" if values.shape[1] == 2 and _is_monotonic(values[front]) else ""
     axes.plot(*values[front].T, "o", ls=line, color=DISTINCT[0], ms=4.5, label="front")
     if chosen is not None:
         axes.plot(*values[chosen], "o", mfc="none", mec=LIMIT, mew=1.6, ms=11, label="chosen")
@@ -270,7 +270,7 @@ def _pair(
             note(axes, str(number + 1), values[number], (4, 4))
 
 
-def _ordered(values: Floats) -> bool:
+def _is_monotonic(values: Floats) -> bool:
     """Whether points that follow each other go one way in both directions."""
     steps = np.diff(values, axis=0)
     return bool(len(steps)) and all(
@@ -279,50 +279,50 @@ def _ordered(values: Floats) -> bool:
 
 
 @styled()
-def sensitivity_figure(found: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Figure:
+def sensitivity_figure(records: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Figure:
     """Tornado about the chosen design, and Sobol indices over the whole range, for each quantity.
 
-    `found`: Records of `railsim.studies.sensitivity.Sensitivity`. `labels`: Quantities with their
+    `records`: Records of `railsim.studies.sensitivity.Sensitivity`. `labels`: Quantities with their
     units.
     """
-    figure = Picture(10.2, len(found) * (1.3 + 0.32 * len(found[0]["low"])))
-    grid = figure.subplots(len(found), 2, squeeze=False)
-    for (left, right), one, label in zip(grid, found, labels, strict=True):
-        _tornado(left, one, label)
-        _indices(right, one)
+    figure = Picture(10.2, len(records) * (1.3 + 0.32 * len(records[0]["low"])))
+    grid = figure.subplots(len(records), 2, squeeze=False)
+    for (left, right), record, label in zip(grid, records, labels, strict=True):
+        _tornado(left, record, label)
+        _indices(right, record)
     handles, names = grid[0][1].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower right", ncols=2)
     return figure
 
 
-def _tornado(axes: Axes, one: Mapping[str, Any], label: str) -> None:
-    names = sorted(one["low"], key=lambda name: abs(one["high"][name] - one["low"][name]))
+def _tornado(axes: Axes, record: Mapping[str, Any], label: str) -> None:
+    names = sorted(record["low"], key=lambda name: abs(record["high"][name] - record["low"][name]))
     axes.use_sticky_edges = False
-    widest = max(abs(one["high"][name] - one["low"][name]) for name in names)
+    widest = max(abs(record["high"][name] - record["low"][name]) for name in names)
     for row, name in enumerate(names):
-        low, high = one["low"][name], one["high"][name]
+        low, high = record["low"][name], record["high"][name]
         axes.barh(row, high - low, left=low, height=0.55, color=DISTINCT[4], zorder=2)
         if abs(high - low) < NARROW * widest:
             continue
-        for value, words in ((low, "low"), (high, "high")):
-            outer = (value >= max(low, high)) if words == "high" else (value > min(low, high))
+        for value, end in ((low, "low"), (high, "high")):
+            outer = (value >= max(low, high)) if end == "high" else (value > min(low, high))
             shift, ha = ((4, 0), "left") if outer else ((-4, 0), "right")
-            note(axes, words, (value, row), shift, ha, "center")
+            note(axes, end, (value, row), shift, ha, "center")
     axes.set_yticks(range(len(names)), [name.removeprefix("vehicle.") for name in names])
     axes.set(xlabel=label, title="From bound to bound, the others as chosen")
     axes.margins(x=0.15)
 
 
-def _indices(axes: Axes, one: Mapping[str, Any]) -> None:
-    names = sorted(one["total"], key=lambda name: one["total"][name])
+def _indices(axes: Axes, record: Mapping[str, Any]) -> None:
+    names = sorted(record["total"], key=lambda name: record["total"][name])
     rows = np.arange(len(names))
-    total = [one["total"][name] for name in names]
-    first = [one["first"][name] for name in names]
+    total = [record["total"][name] for name in names]
+    first = [record["first"][name] for name in names]
     axes.barh(rows + 0.17, total, height=0.3, color=DISTINCT[0], label="with interactions")
     axes.barh(rows - 0.17, first, height=0.3, color=DISTINCT[5], label="alone")
     axes.set_yticks(rows, [name.removeprefix("vehicle.") for name in names])
     axes.set(xlim=(0.0, max(1.0, *total, *first)), xlabel="share of the variance")
-    axes.set(title=f"Sobol indices (surrogate's error {100.0 * one['error']:.0f} %)")
+    axes.set(title=f"Sobol indices (surrogate's error {100.0 * record['error']:.0f} %)")
 
 
 PROFILE = (-0.045, 0.035)  # m from the nominal rolling circle

@@ -85,7 +85,7 @@ class Picture(Figure):
             self.suptitle("\n".join(lines), x=0.012, ha="left")
 
     def _repr_png_(self) -> bytes:
-        return drawn(self)
+        return to_bytes(self)
 
 
 def single(
@@ -144,19 +144,19 @@ def spans(sections: Sequence[Section], distance: Floats, axis: Floats) -> list[S
     return found
 
 
-def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
-    """Shade transitions and curves; with `named`, write what they are above the axes.
+def shade(axes: Axes, spans: Sequence[Span], *, with_names: bool = False) -> None:
+    """Shade transitions and curves; with `with_names`, write what they are above the axes.
 
     Where there is no room for all names, those of curves come first.
     """
-    for section, begin, end in shown:
+    for section, begin, end in spans:
         axes.axvspan(begin, end, color=SHADES[section.type], lw=0, zorder=0)
-    if not named or not shown:
+    if not with_names or not spans:
         return
     low, high = axes.get_xlim()
     letter = LETTER * (high - low) / (72.0 * axes.bbox.width / axes.figure.dpi)
     names: list[tuple[float, float, str]] = []  # middle, half of the width, words
-    for section, begin, end in sorted(shown, key=lambda span: span[0].type):  # CIR before CLO
+    for section, begin, end in sorted(spans, key=lambda span: span[0].type):  # CIR before CLO
         words = "CLO" if section.type == "CLO" else f"R {1.0 / section.start_value:.6g}"
         middle, half = 0.5 * (begin + end), 0.5 * letter * len(words)
         if end - begin < (2.0 * half if words == "CLO" else 0.5 * letter):
@@ -174,22 +174,22 @@ def signed(value: float) -> str:
     return f"{value:g}".replace("-", "\N{MINUS SIGN}")
 
 
-def broken(words: str, width: float) -> str:
+def wrap(text: str, width: float) -> str:
     """Return words without formatting in lines that have room on a width [inches]."""
-    return fill(unformatted(words), int(SMALL * width))
+    return fill(unformatted(text), int(SMALL * width))
 
 
 def note(
-    axes: Axes, words: str, at: Any, shift: Any, ha: Any = "left", va: Any = "baseline", **how: Any
+    axes: Axes, text: str, xy: Any, shift: Any, ha: Any = "left", va: Any = "baseline", **how: Any
 ) -> Annotation:
     """Write words beside a point, shifted by points of print; `frame`: coordinates of the point."""
     look: dict[str, Any] = {"fontsize": 7, "color": "0.3", "frame": "data"} | how
-    return axes.annotate(words, at, shift, look.pop("frame"), "offset points", ha=ha, va=va, **look)
+    return axes.annotate(text, xy, shift, look.pop("frame"), "offset points", ha=ha, va=va, **look)
 
 
-def key(words: str, **look: Any) -> Line2D:
+def key(label: str, **look: Any) -> Line2D:
     """Return an entry of a legend."""
-    return Line2D([], [], label=words, **look)
+    return Line2D([], [], label=label, **look)
 
 
 def side_keys(sides: Collection[str | None], **look: Any) -> list[Line2D]:
@@ -209,19 +209,19 @@ def grid_of(
     return figure, cells[:count]
 
 
-def label_grid(axes: Any, count: int, across: int, words: tuple[str, str]) -> None:
+def label_grid(axes: Any, count: int, across: int, labels: tuple[str, str]) -> None:
     """Label the outer ones of the axes in use, and hide the others."""
-    for one in axes[count:]:
-        one.set_visible(False)
-    for one in axes[max(count - across, 0) : count]:
-        one.set_xlabel(words[0])
-    for one in axes[::across]:
-        one.set_ylabel(words[1])
+    for panel in axes[count:]:
+        panel.set_visible(False)
+    for panel in axes[max(count - across, 0) : count]:
+        panel.set_xlabel(labels[0])
+    for panel in axes[::across]:
+        panel.set_ylabel(labels[1])
 
 
-def say(axes: Axes, words: str) -> None:
+def say(axes: Axes, text: str) -> None:
     """Write in the middle of axes why they are empty."""
-    axes.text(0.5, 0.5, words, ha="center", va="center", transform=axes.transAxes)
+    axes.text(0.5, 0.5, text, ha="center", va="center", transform=axes.transAxes)
     axes.set(xticks=[], yticks=[])
 
 
@@ -234,11 +234,11 @@ def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=PICTURES)
     with whole_file(path) as partial:
-        partial.write_bytes(drawn(figure, path.suffix[1:].lower()))
+        partial.write_bytes(to_bytes(figure, path.suffix[1:].lower()))
     return path
 
 
-def drawn(figure: Figure, form: str = "png") -> bytes:
+def to_bytes(figure: Figure, form: str = "png") -> bytes:
     """Return the file of a figure in a format of matplotlib's."""
     stream = BytesIO()
     with warnings.catch_warnings():

@@ -45,9 +45,9 @@ def track_figure(track: Track, title: str = "") -> Figure:
     s = np.linspace(0.0, track.length, RESOLUTION + 1)
     rows = [*_alignment_rows(track, alignment, s), *_rail_rows(track, s), *_table_rows(track, s)]
     sections = layout.curvature_sections(track)
-    remarks = _marked(track)
+    remarks = _remark_positions(track)
     height = 3.9 + 1.4 * len(rows) + 0.17 * len(remarks)
-    constants = style.broken(_constants(track), 7.6)
+    constants = style.wrap(_constants(track), 7.6)
     room = "\n " * len(constants.splitlines())
     figure = Picture(8.0, height, f"{unformatted(title or track.name)}{room}")
     axes = figure.subplots(1 + len(rows), 1, height_ratios=[1.9] + [1.0] * len(rows))
@@ -59,7 +59,7 @@ def track_figure(track: Track, title: str = "") -> Figure:
         _draw(axes[1 + k], row, s)
         if k:
             axes[1 + k].sharex(axes[1])
-        shade(axes[1 + k], shown, named=k == 0)
+        shade(axes[1 + k], shown, with_names=k == 0)
         if k + 1 < len(rows):
             axes[1 + k].tick_params(labelbottom=False)
     for position in (at for positions, _ in remarks for at in positions):
@@ -147,22 +147,22 @@ def _constants(track: Track) -> str:
     return ", ".join(words)
 
 
-def _marked(track: Track) -> list[tuple[list[float], str]]:
+def _remark_positions(track: Track) -> list[tuple[list[float], str]]:
     """Return positions and text of what is unusual in the alignment; equal texts once."""
     plans = layout.curvature_sections, layout.cant_sections, layout.gradient_sections
     begins = {section.key: section.begin for plan in plans for section in plan(track)}
-    found: dict[str, list[float]] = {}
+    by_text: dict[str, list[float]] = {}
     for remark in layout.track_remarks(track):
         if remark.key in begins:
-            found.setdefault(remark.text, []).append(begins[remark.key])
-    times = {text: f"; {len(at)} times" if len(at) > 1 else "" for text, at in found.items()}
-    marked = sorted((sorted(at), text + times[text]) for text, at in found.items())
-    if len(marked) <= MOST_REMARKS:
-        return marked
-    *shown, (at, text) = marked[:MOST_REMARKS]
-    more = marked[MOST_REMARKS:]
-    at += [position for others, _ in more for position in others]
-    return [*shown, (at, f"{text}; and {len(more)} more")]
+            by_text.setdefault(remark.text, []).append(begins[remark.key])
+    times = {text: f"; {len(s)} times" if len(s) > 1 else "" for text, s in by_text.items()}
+    remarks = sorted((sorted(s), text + times[text]) for text, s in by_text.items())
+    if len(remarks) <= MOST_REMARKS:
+        return remarks
+    *shown, (s, text) = remarks[:MOST_REMARKS]
+    more = remarks[MOST_REMARKS:]
+    s += [position for others, _ in more for position in others]
+    return [*shown, (s, f"{text}; and {len(more)} more")]
 
 
 def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Floats) -> None:

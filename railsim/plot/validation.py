@@ -10,7 +10,7 @@ from railsim.arrays import Floats
 from railsim.assessment.model_comparison import ModelValidation, Overlay
 from railsim.definitions.measurement import quantity_of
 from railsim.identification.identified import Channel, Identified
-from railsim.plot.style import DISTINCT, LIMIT, broken, grid_of, styled
+from railsim.plot.style import DISTINCT, LIMIT, grid_of, styled, wrap
 from railsim.text import unformatted
 
 MOST = 12  # channels of a picture
@@ -21,12 +21,12 @@ SMALL = {"axes.labelsize": "small", "axes.titlesize": "small"}  # of pictures wi
 NEAR = 200.0  # m to both sides of the middle of a run, of which channels are drawn
 
 
-def _shown(quantity: str) -> tuple[float, str]:
-    found = quantity_of(quantity)
-    return (found.scale, _written(found.shown_unit)) if found is not None else (1.0, "SI")
+def _scale_and_unit(quantity: str) -> tuple[float, str]:
+    entry = quantity_of(quantity)
+    return (entry.scale, _unit_text(entry.shown_unit)) if entry is not None else (1.0, "SI")
 
 
-def _written(unit: str) -> str:
+def _unit_text(unit: str) -> str:
     return unit.replace("s2", "s²")
 
 
@@ -46,8 +46,8 @@ def scatter(validation: ModelValidation) -> Figure:
             for sign in (-1.0, 1.0):
                 axes.plot(ends, ends + sign * scale * limit, style, color="0.6", linewidth=0.8)
         axes.plot(*both, ".", color=LIMIT if one.verdict == "fail" else DISTINCT[0])
-        title = broken(f"{one.quantity.words}: {one.verdict}", 2.3)
-        unit = f" ({_written(one.quantity.column.unit)})" if one.quantity.column.unit else ""
+        title = wrap(f"{one.quantity.words}: {one.verdict}", 2.3)
+        unit = f" ({_unit_text(one.quantity.column.unit)})" if one.quantity.column.unit else ""
         axes.set(title=title, xlabel=f"measured{unit}", ylabel=f"simulated{unit}")
         axes.set(xlim=ends, ylim=ends)
     return figure
@@ -66,7 +66,7 @@ def differences(validation: ModelValidation) -> Figure:
         for limit in (-2 / 3, 2 / 3):
             axes.axvline(limit, color="0.5", linewidth=0.8, linestyle="--")
         axes.axvline(one.mean / one.limit, color="k", linewidth=1.0)
-        words = broken(one.quantity.words, 1.7)
+        words = wrap(one.quantity.words, 1.7)
         axes.set(title=words, xlabel="difference / limit", ylabel="number")
     return figure
 
@@ -76,25 +76,25 @@ def overlays(validation: ModelValidation) -> Figure:
     """Draw measured and simulated channels of the first run over the arc length."""
     shown = _first(validation.overlays)
 
-    def part(one: Overlay) -> tuple[Floats, slice]:
-        middle = 0.5 * (one.s[0] + one.s[-1])
-        first, last = np.searchsorted(one.s, (middle - NEAR, middle + NEAR))
-        return one.s, slice(first, last, max(1, (last - first) // LONGEST))
+    def part(channel: Overlay) -> tuple[Floats, slice]:
+        middle = 0.5 * (channel.s[0] + channel.s[-1])
+        first, last = np.searchsorted(channel.s, (middle - NEAR, middle + NEAR))
+        return channel.s, slice(first, last, max(1, (last - first) // LONGEST))
 
     return _over_arc(shown, part, BOTH, 0.7)
 
 
 def _over_arc(
-    shown: Sequence[Any], part: Callable[..., Any], lines: Mapping[str, Any], lw: float
+    channels: Sequence[Any], part: Callable[..., Any], lines: Mapping[str, Any], lw: float
 ) -> Figure:
     """Draw channels by the names of their attributes, in looks, over a part of the arc length."""
-    figure, grid = grid_of(len(shown), 1, 8.0, 1.3, 0.8, unformatted(shown[0].run))
-    for axes, one in zip(grid, shown, strict=True):
-        (scale, unit), (s, rows) = _shown(one.quantity), part(one)
+    figure, grid = grid_of(len(channels), 1, 8.0, 1.3, 0.8, unformatted(channels[0].run))
+    for axes, channel in zip(grid, channels, strict=True):
+        (scale, unit), (s, rows) = _scale_and_unit(channel.quantity), part(channel)
         for name, (colour, ls) in lines.items():
-            values = scale * getattr(one, name)[rows]
+            values = scale * getattr(channel, name)[rows]
             axes.plot(s[rows], values, color=colour, ls=ls, lw=lw, label=name)
-        axes.set_ylabel(f"{one.name}\n({unit})", fontsize="small")
+        axes.set_ylabel(f"{channel.name}\n({unit})", fontsize="small")
     grid[0].legend(
         fontsize="small", ncols=len(lines), loc="lower right", bbox_to_anchor=(1.0, 1.0),
         borderaxespad=0.2,
@@ -106,55 +106,55 @@ def _over_arc(
 @styled(SMALL)
 def spectra(validation: ModelValidation) -> Figure:
     """Draw power spectral densities of measured and simulated channels of the first run."""
-    shown = _first(validation.overlays)
-    figure, grid = grid_of(len(shown), 3, 8.0, 1.9, 0.8, unformatted(shown[0].run))
-    for axes, one in zip(grid, shown, strict=True):
-        scale, unit = _shown(one.quantity)
+    channels = _first(validation.overlays)
+    figure, grid = grid_of(len(channels), 3, 8.0, 1.9, 0.8, unformatted(channels[0].run))
+    for axes, channel in zip(grid, channels, strict=True):
+        scale, unit = _scale_and_unit(channel.quantity)
         for name, (colour, _) in BOTH.items():
-            density = _density(one, scale * getattr(one, name))
+            density = _density(channel, scale * getattr(channel, name))
             axes.loglog(*density, color=colour, lw=0.9, label=name)
-        axes.set(title=one.name, xlabel="frequency (Hz)", ylabel=f"PSD (({unit})²/Hz)")
+        axes.set(title=channel.name, xlabel="frequency (Hz)", ylabel=f"PSD (({unit})²/Hz)")
     grid[0].legend(fontsize="small")
     return figure
 
 
-def _density(one: Overlay, values: Floats) -> tuple[Floats, Floats]:
+def _density(channel: Overlay, values: Floats) -> tuple[Floats, Floats]:
     from scipy.signal import welch
 
     x = np.where(np.isfinite(values), values, 0.0)
-    f, power = welch(x, one.rate, nperseg=min(len(x), max(256, int(8 * one.rate))))
+    f, power = welch(x, channel.rate, nperseg=min(len(x), max(256, int(8 * channel.rate))))
     inside = (f > 0.2) & (f < 20.0)
     return f[inside], np.maximum(power[inside], 1e-12 * power[inside].max())
 
 
 @styled()
-def fits(found: Identified) -> Figure:
+def fits(identified: Identified) -> Figure:
     """Draw the channels of the first run, measured, before and after, over a part of the line."""
 
-    def part(one: Channel) -> tuple[Floats, slice]:
-        middle = len(one.at) // 2
-        return one.at, slice(middle, middle + int(4.0 / one.step))
+    def part(channel: Channel) -> tuple[Floats, slice]:
+        middle = len(channel.at) // 2
+        return channel.at, slice(middle, middle + int(4.0 / channel.step))
 
     lines = {"measured": ("k", "-"), "before": (DISTINCT[4], "--"), "after": (DISTINCT[1], "-")}
-    return _over_arc(_first(found.channels), part, lines, 0.8)
+    return _over_arc(_first(identified.channels), part, lines, 0.8)
 
 
 @styled(SMALL)
-def residual_spectra(found: Identified) -> Figure:
+def residual_spectra(identified: Identified) -> Figure:
     """Draw the cumulative periodograms of the residuals: a straight line where they are white."""
-    shown = _first(found.channels)
-    figure, grid = grid_of(len(shown), 3, 8.0, 1.9, 0.8, unformatted(shown[0].run))
-    low, high = found.band
-    for axes, one in zip(grid, shown, strict=True):
-        rest = one.measured - one.after
+    channels = _first(identified.channels)
+    figure, grid = grid_of(len(channels), 3, 8.0, 1.9, 0.8, unformatted(channels[0].run))
+    low, high = identified.band
+    for axes, channel in zip(grid, channels, strict=True):
+        rest = channel.measured - channel.after
         power = np.abs(np.fft.rfft(np.where(np.isfinite(rest), rest, 0.0))) ** 2
-        f = np.fft.rfftfreq(len(rest), one.step)
+        f = np.fft.rfftfreq(len(rest), channel.step)
         inside = (f >= low) & (f <= high)
         summed = np.cumsum(power[inside]) / max(float(power[inside].sum()), 1e-300)
         axes.plot([low, high], [0.0, 1.0], color="0.6", linewidth=0.8)
-        axes.plot(f[inside], summed, color=DISTINCT[0] if one.is_white else LIMIT)
-        judged = "white" if one.is_white else "not white"
-        axes.set(title=f"{one.name}: {judged if one.probability >= 0.0 else 'not judged'}")
+        axes.plot(f[inside], summed, color=DISTINCT[0] if channel.is_white else LIMIT)
+        judged = "white" if channel.is_white else "not white"
+        axes.set(title=f"{channel.name}: {judged if channel.probability >= 0.0 else 'not judged'}")
         axes.set(xlabel="frequency (Hz)", ylabel="share of the power")
     return figure
 

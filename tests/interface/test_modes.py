@@ -218,7 +218,7 @@ def test_cant_of_a_left_hand_curve_is_negative(capsys, cant, told):
 def undrawn():
     """Without the picture beside an animation."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("railsim.plot.style.drawn", lambda _: b"")
+        patch.setattr("railsim.plot.style.to_bytes", lambda _: b"")
         yield
 
 

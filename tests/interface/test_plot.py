@@ -19,7 +19,7 @@ from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import InputError
 from railsim.files.sources import read_source
 from railsim.notation import QUANTITIES
-from railsim.plot.curving import _parted, curving_figure
+from railsim.plot.curving import _split_hands, curving_figure
 from railsim.plot.histories import STUDY, frame, histories
 from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure
@@ -256,11 +256,11 @@ def test_where_names_do_not_fit_side_by_side_those_of_curves_stay():
     axes = Figure(figsize=(3.0, 2.0)).subplots()
     axes.set_xlim(0.0, 3000.0)
     sections = curvature_sections(load_track("curve_r250"))
-    shade(axes, spans(sections, *[np.array([0.0, 980.0])] * 2), named=True)
+    shade(axes, spans(sections, *[np.array([0.0, 980.0])] * 2), with_names=True)
     assert [text.get_text() for text in axes.texts] == ["R 250"]
     axes = Figure(figsize=(6.0, 2.0)).subplots()
     axes.set_xlim(0.0, 420.1)  # the curve ends 0.1 m before, and nothing of the transition is seen
-    shade(axes, spans(sections, *[np.array([0.0, 420.1])] * 2), named=True)
+    shade(axes, spans(sections, *[np.array([0.0, 420.1])] * 2), with_names=True)
     assert [text.get_text() for text in axes.texts] == ["CLO", "R 250"]
 
 
@@ -499,11 +499,11 @@ def test_wheelsets_in_a_curve_are_drawn_over_the_whole_width(base):
 
 def test_no_line_joins_left_hand_curves_to_right_hand_ones():
     """Over a radius of zero; the straight lies at both ends."""
-    radius, values = _parted(np.array([-500.0, -250.0, 250.0]), np.array([1.0, 2.0, 3.0]))
+    radius, values = _split_hands(np.array([-500.0, -250.0, 250.0]), np.array([1.0, 2.0, 3.0]))
     np.testing.assert_array_equal(radius, [-500.0, -250.0, np.nan, 250.0])
     np.testing.assert_array_equal(values, [1.0, 2.0, np.nan, 3.0])
     for one_side in (np.array([250.0, 500.0]), np.array([-500.0, -250.0])):
-        np.testing.assert_array_equal(_parted(one_side, one_side), [one_side, one_side])
+        np.testing.assert_array_equal(_split_hands(one_side, one_side), [one_side, one_side])
 
 
 def test_rail_from_a_file_is_called_by_its_name_without_its_folders():

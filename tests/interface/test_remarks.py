@@ -61,7 +61,7 @@ def test_index_and_table_of_a_study_repeat_them(tmp_path):
 
 
 def test_comparison_names_the_result_that_they_belong_to(files, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("railsim.plot.style.drawn", lambda _: b"")
+    monkeypatch.setattr("railsim.plot.style.to_bytes", lambda _: b"")
     assert main(["compare", *files, "--out", str(tmp_path / "both")]) == 0
     printed = capsys.readouterr().out
     for remark in REMARKS:

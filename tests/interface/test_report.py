@@ -802,10 +802,10 @@ def test_published_values_stand_beside_the_run_they_belong_to():
     assert set(rows) == {"dQ_over_Q0", "sum_abs_Y", "Y_over_Q", "wheelset_roll", "wheelset_yaw",
                          "wheelset_lateral"}  # fmt: skip
     largest = result.dQ_over_Q0[:, 0, 0].max()
-    assert rows["dQ_over_Q0"].found == largest
+    assert rows["dQ_over_Q0"].computed == largest
     assert rows["dQ_over_Q0"].difference == pytest.approx(largest / 0.3792 - 1.0)
     instant = int(np.argmin(np.abs(result.time - 19.8)))
-    assert rows["wheelset_yaw"].found == result.wheelset_yaw[instant, 0]
+    assert rows["wheelset_yaw"].computed == result.wheelset_yaw[instant, 0]
     assert published_comparisons({"a": example_result(speed=19.0)}) == []
     value = rows["wheelset_yaw"].value
     assert reading(example_result(duration=10.0), value) is None

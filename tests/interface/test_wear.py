@@ -187,7 +187,7 @@ def test_command_draws_the_wear_of_both_rails(tmp_path, monkeypatch):
 
     monkeypatch.setattr("railsim.studies.rail_wear.rail_wear", steps)
     figures = []
-    monkeypatch.setattr("railsim.plot.style.drawn", lambda figure: figures.append(figure) or b"")
+    monkeypatch.setattr("railsim.plot.style.to_bytes", lambda figure: figures.append(figure) or b"")
     given = ["--traffic", "coach_manchester", "20", "1", "--tonnage", "0.2", "--step", "0.1"]
     assert main(["rail-wear", "curve_r500", *given, "--out", str(tmp_path / "w")]) == 0
     (figure,) = figures
@@ -217,7 +217,7 @@ def test_wear_that_is_interrupted_while_it_is_drawn_goes_on(tmp_path, monkeypatc
         raise KeyboardInterrupt
 
     monkeypatch.setattr("railsim.studies.rail_wear.rail_wear", steps)
-    monkeypatch.setattr("railsim.plot.style.drawn", lambda _: b"")
+    monkeypatch.setattr("railsim.plot.style.to_bytes", lambda _: b"")
     folder = tmp_path / "worn"
     given = ["--traffic", "coach_manchester", "20", "1", "--tonnage", "0.1", "--step", "0.1"]
     command = ["rail-wear", "curve_r500", *given, "--out", str(folder)]
