@@ -17,7 +17,7 @@ from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, 
 from railsim.mechanisms.inversion import largest, zeros
 from railsim.mechanisms.kinematics import Motion, check_freedom, driver_words, folded, solve
 from railsim.mechanisms.model import Model, build
-from railsim.mechanisms.outputs import check_pressure, outputs, sampled, zone_drivers
+from railsim.mechanisms.outputs import check_pressure, outputs, sampling_positions, zone_drivers
 
 DENSE = 401  # positions from which heights and lengths are looked up
 
@@ -105,14 +105,14 @@ class Analysis:
         if name not in self.known:
             motion, values = self._dense
 
-            def found(m: Motion) -> Any:
+            def values_at(m: Motion) -> Any:
                 # many results have their extremes at an end, the same positions
-                at = m.s.tobytes()
-                self.near[at] = self.near.get(at) or outputs(m)
-                return of(self.near[at][name])
+                key = m.s.tobytes()
+                self.near[key] = self.near.get(key) or outputs(m)
+                return of(self.near[key][name])
 
-            least, of_least = largest(motion, lambda m: -found(m), -of(values[name]))
-            most, of_most = largest(motion, found, of(values[name]))
+            least, of_least = largest(motion, lambda m: -values_at(m), -of(values[name]))
+            most, of_most = largest(motion, values_at, of(values[name]))
             self.known[name] = Extremes(-of_least, least, of_most, most)
         return self.known[name]
 
@@ -191,7 +191,7 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
     model = build(definition)
     check_freedom(model)
     dense = solve(model, np.linspace(model.start, model.end, DENSE))
-    motion = solve(model, sampled(dense))
+    motion = solve(model, sampling_positions(dense))
     output = outputs(motion)
     check_pressure(motion, output)
     at_zone = zone_drivers(dense)

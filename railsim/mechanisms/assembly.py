@@ -41,7 +41,7 @@ class OpenLoop:
         return f"loop {loop}: '{self.blamed}' {found}"
 
 
-def assembled(model: Model, s: float, pose: Floats, arcs: Integers) -> Floats | None:
+def assemble(model: Model, s: float, pose: Floats, arcs: Integers) -> Floats | None:
     """The assembly at a value of the driver near a pose (n_bodies + 1, 3); None where none is.
 
     `arcs` are those of every cam's roller, shape (joint,).
@@ -57,11 +57,11 @@ def assembled(model: Model, s: float, pose: Floats, arcs: Integers) -> Floats | 
 
 
 def open_loop(
-    model: Model, s: float, pose: Floats, arcs: Integers, known: OpenLoop | None = None
+    model: Model, s: float, pose: Floats, arcs: Integers, first: OpenLoop | None = None
 ) -> OpenLoop | None:
     """The loop that cannot close at a value of the driver; None where all of them close.
 
-    With `known`, which opened first on the way there, no other loop is blamed.
+    With `first`, which opened first on the way there, no other loop is blamed.
     """
     scales = _scales(model)
     q, residual = _closest(model, s, pose, arcs, scales)
@@ -70,15 +70,15 @@ def open_loop(
     if largest < CLOSED * model.linkage.size:
         return None
     loop = [name for name, size in sizes.items() if size > IN_LOOP * largest]
-    if known is not None:
-        loop = list(known.joints)
+    if first is not None:
+        loop = list(first.joints)
     joints = model.definition.joints
 
     def rank(name: str) -> tuple[bool, bool, float]:
         joint = joints[name]
         return isinstance(joint, Link), not isinstance(joint, Revolute | Prismatic), sizes[name]
 
-    blamed = max(loop, key=rank) if known is None else known.blamed
+    blamed = max(loop, key=rank) if first is None else first.blamed
     a, b = model.joint_rows[blamed]
     weights = TIGHT * scales
     weights[a:b] = scales[a:b]
@@ -134,17 +134,17 @@ def _closest(
 
     columns = _scales(model, columns=True)
 
-    def at(x: Floats) -> Floats:
+    def poses(x: Floats) -> Floats:
         q = pose.copy()
         q[1:] = (x / columns).reshape(-1, 3)
         return q
 
     def residual(x: Floats) -> Floats:
-        return weights * constraints(model, s, at(x), arcs)[0]
+        return weights * constraints(model, s, poses(x), arcs)[0]
 
     def slope(x: Floats) -> Any:
-        return weights[:, None] * constraints(model, s, at(x), arcs)[1] / columns
+        return weights[:, None] * constraints(model, s, poses(x), arcs)[1] / columns
 
     accuracy: Any = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
-    q = at(least_squares(residual, pose[1:].ravel() * columns, slope, method="lm", **accuracy).x)
+    q = poses(least_squares(residual, pose[1:].ravel() * columns, slope, method="lm", **accuracy).x)
     return q, constraints(model, s, q, arcs)[0]

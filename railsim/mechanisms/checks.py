@@ -58,23 +58,23 @@ def _forces(result: Analysis, unknown: Actuator) -> Iterator[Check]:
     n, limits = result.model.number, result.definition.optimise
     least, most = either_way(result, "force")
     acts = unknown.acts if isinstance(unknown, Cylinder) else "push"
-    wanted = limits.available_force if limits is not None else None
-    most_wanted = np.inf if wanted is None else n(wanted)
+    stated = limits.available_force if limits is not None else None
+    most_available = np.inf if stated is None else n(stated)
     if isinstance(unknown, Cylinder):
         pressure = n(unknown.supply_pressure)
         note = "largest force of the chamber under pressure against bore and supply pressure"
-        note = note if wanted is None else f"{note}, and [optimise]"
+        note = note if stated is None else f"{note}, and [optimise]"
         acting = "pull" if acts == "pull" else "push"
-        available = min(pressure * chamber_area(result.model, unknown, acting), most_wanted)
+        available = min(pressure * chamber_area(result.model, unknown, acting), most_available)
         yield Check("available_force", max(most, 0.0), available, "below", "N", note)
         if acts == "both":
             note = "largest pull against bore less rod and supply pressure"
-            available = min(pressure * chamber_area(result.model, unknown, "pull"), most_wanted)
+            available = min(pressure * chamber_area(result.model, unknown, "pull"), most_available)
             yield Check("available_pull", max(-least, 0.0), available, "below", "N", note)
-    elif wanted is not None:
+    elif stated is not None:
         note = "largest amount of the force"
         unit = quantity("force", result.definition).unit
-        yield Check("available_force", result.peak_force, most_wanted, "below", unit, note)
+        yield Check("available_force", result.peak_force, most_available, "below", unit, note)
     if isinstance(unknown, AirSpring) and unknown.supply_pressure is not None:
         needed, note = either_way(result, "pressure")[1], "largest pressure that is needed"
         yield Check("available_pressure", needed, n(unknown.supply_pressure), "below", "Pa", note)

@@ -68,13 +68,13 @@ def lid_force(weight: float, D: float, b: float, n: float, alpha: float) -> floa
     return weight * D / (b * n) * 9.8 * alpha
 
 
-def next_size(sizes: list[float], wanted: float) -> float | None:
+def next_size(sizes: list[float], needed: float) -> float | None:
     """Smallest of the made sizes that is not below the wanted one; None where none is.
 
     >>> next_size([0.032, 0.04, 0.05], 0.033)
     0.04
     """
-    return min((size for size in sizes if size >= wanted * (1.0 - 1e-12)), default=None)
+    return min((size for size in sizes if size >= needed * (1.0 - 1e-12)), default=None)
 
 
 def table_value(rows: Floats, x: Any) -> Any:

@@ -58,7 +58,7 @@ def positions_of_rest(dense: Motion) -> tuple[Rest, ...]:
     return rests(dense, lambda m, sense: forces.generalised_force(m, forces.Rates(friction=sense)))
 
 
-def moved(motion: Motion) -> bool:
+def is_loaded(motion: Motion) -> bool:
     """Whether weights or elements act on a mechanism at all."""
     return bool(np.any(forces.generalised_force(motion)))
 
@@ -100,7 +100,7 @@ def _rest_ranges(dense: Motion, force: Force) -> Iterator[Rest]:
             yield Rest(0.5 * (low + high), low, high, kind != -1 and other != 1)
 
 
-def _held(dense: Motion, work: float) -> tuple[float, float]:
+def _held_pressure(dense: Motion, work: float) -> tuple[float, float]:
     """Pressure of `[contact]` [Pa], and the force that gives what is wanted at work height [N].
 
     The pressure is the stated one, or that of the force.
@@ -108,10 +108,10 @@ def _held(dense: Motion, work: float) -> tuple[float, float]:
     definition = dense.model.definition
     contact = definition.contact
     assert contact is not None
-    at = solve(dense.model, [work])
-    wanted = dense.model.number(contact.force) * height_of(at)[1] - forces.generalised_force(at)
-    force = wanted / forces.unit_work(at, definition.held_by)
-    pressure, stated = forces.pressure_for(at, definition.unknown, force)[0], contact.pressure
+    m = solve(dense.model, [work])
+    needed = dense.model.number(contact.force) * height_of(m)[1] - forces.generalised_force(m)
+    force = needed / forces.unit_work(m, definition.held_by)
+    pressure, stated = forces.pressure_for(m, definition.unknown, force)[0], contact.pressure
     automatic = isinstance(stated, Expression) and bool(stated.names & definition.automatic)
     if stated != AUTO and not automatic:
         pressure = dense.model.number(stated)
@@ -127,20 +127,20 @@ def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> C
     if definition.contact is None:
         return None
     unknown = definition.unknown
-    pressure, needed = _held(dense, at_zone["work"])
+    pressure, needed = _held_pressure(dense, at_zone["work"])
 
-    def generalised(positions: Motion, friction: int) -> Any:
+    def net_force(positions: Motion, friction: int) -> Any:
         push = forces.force_at_pressure(positions, unknown, pressure, needed)
         work = forces.unit_work(positions, definition.held_by)
         return push * work + forces.generalised_force(positions, forces.Rates(friction=friction))
 
     def force(positions: Motion, way: int) -> Floats:
-        return np.asarray(generalised(positions, way * dense.model.sense) / height_of(positions)[1])
+        return np.asarray(net_force(positions, way * dense.model.sense) / height_of(positions)[1])
 
-    found = []
-    for rest in rests(dense, generalised):
+    rest_heights = []
+    for rest in rests(dense, net_force):
         low, high = sorted(height_of(solve(dense.model, [rest.low, rest.high]))[0].tolist())
-        found.append(Rest(0.5 * (low + high), low, high, rest.stable))
+        rest_heights.append(Rest(0.5 * (low + high), low, high, rest.stable))
     in_zone = solve(dense.model, list(at_zone.values()))
     ways = (0, 1, -1)
     zone, up, down = (dict(zip(at_zone, force(in_zone, way).tolist(), strict=True)) for way in ways)
@@ -151,4 +151,4 @@ def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> C
     missing = not np.all(np.isfinite([*curve, *zone.values()]))
     reason = f"{pressure / 1e6:.5f} MPa leaves the air spring's table" if missing else ""
     curves = curve, (rising, falling)
-    return Contact(pressure, zone, up, down, least, *curves, tuple(found), reason)
+    return Contact(pressure, zone, up, down, least, *curves, tuple(rest_heights), reason)

@@ -49,7 +49,7 @@ def lines(motion: Motion) -> list[Line]:
             kind = "spring" if isinstance(element, parts.Spring | parts.GasSpring) else "damper"
             line = _between(motion, kind, name, pair)
             if isinstance(element, parts.Spring):
-                line = _coiled(line)
+                line = _zigzag(line)
             elif isinstance(element, parts.GasSpring):
                 line = _telescope(line, element, motion)
             found.append(line)
@@ -65,7 +65,7 @@ def _axes(line: Line) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     return first, last, length, along, np.stack((-along[:, 1], along[:, 0]), axis=-1)
 
 
-def _coiled(line: Line) -> Line:
+def _zigzag(line: Line) -> Line:
     """A spring as a zigzag between its ends, as wide as a twelfth of its length at first."""
     first, last, length, _, across = _axes(line)
     along, across = last - first, across * length[0] / 24.0

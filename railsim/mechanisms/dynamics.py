@@ -79,8 +79,8 @@ def law_of(model: Model, law: written.Motion, stroke: float) -> tuple[Law, float
         spline = CubicSpline(time, travel)
 
         def tabulated(t: Floats) -> tuple[Floats, Floats, Floats]:
-            at = t + time[0]
-            return spline(at), spline(at, 1), spline(at, 2)
+            shifted = t + time[0]
+            return spline(shifted), spline(shifted, 1), spline(shifted, 2)
 
         return tabulated, float(time[-1] - time[0])
     speed = n(law.speed) if law.speed is not None else abs(stroke) / n(law.duration or 1.0)
@@ -110,7 +110,7 @@ def driven_motion(whole: Motion) -> TimedMotion:
     law = model.definition.motion
     assert law is not None
 
-    def moved(motion: Motion) -> tuple[Any, Any, Any]:
+    def course(motion: Motion) -> tuple[Any, Any, Any]:
         """Length or angle that follows the law, with its derivatives by the driver."""
         if law.angle is not None:
             k = model.bodies[law.angle]
@@ -120,7 +120,7 @@ def driven_motion(whole: Motion) -> TimedMotion:
     what, unit, scale = "length", "mm", 1e3
     if law.angle is not None:
         what, unit, scale = "angle", "deg", float(np.degrees(1.0))
-    known, rate, _ = moved(whole)
+    known, rate, _ = course(whole)
     if len(turned := np.flatnonzero(rate * rate[0] <= 0.0)):
         at = driver_words(model, float(whole.s[turned[0]]))
         found = f"driver at {at}: the {what} turns back there and cannot follow a law"
@@ -133,13 +133,13 @@ def driven_motion(whole: Motion) -> TimedMotion:
     wanted = first + travel
     if law.law != "table":
         wanted = np.clip(wanted, low, high)  # rounding at the ends
-    s = driver_at(whole, lambda motion: moved(motion)[:2], wanted)
+    s = driver_at(whole, lambda motion: course(motion)[:2], wanted)
     if len(lost := np.flatnonzero(~np.isfinite(s))):
         value = f"{wanted[lost[0]] * scale:.3f} {unit}"
         found = f"at {time[lost[0]]:.4g} s the {what} would be {value}"
         raise model.refusal("motion", found, f"{low * scale:.3f} to {high * scale:.3f} {unit}")
     motion = solve(model, s)
-    _, slope, bend = moved(motion)
+    _, slope, bend = course(motion)
     s1 = speed / slope
     s2 = (acceleration - bend * s1**2) / slope
     resting = np.abs(s1) <= 1e-12 * np.max(np.abs(s1))  # but for rounding
@@ -192,20 +192,20 @@ def free_motion(
         mass, slope = inertia(motion)
         if not mass[0] > 0.0:
             raise model.refusal("release", "no mass moves", "masses of bodies")
-        found = generalised_force(motion, Rates(np.array([state[1]]), 0.0, sense, trial=True))
+        total = generalised_force(motion, Rates(np.array([state[1]]), 0.0, sense, trial=True))
         if force is not None:
-            found = found + force(t, motion)
-        return float(found[0] - 0.5 * slope[0] * state[1] ** 2), float(mass[0])
+            total = total + force(t, motion)
+        return float(total[0] - 0.5 * slope[0] * state[1] ** 2), float(mass[0])
 
-    def there(_: float, state: Floats) -> float:
+    def reaches_end(_: float, state: Floats) -> float:
         return float(state[0] - until)
 
     def turns(_: float, state: Floats) -> float:
         return float(state[1])
 
-    there.terminal = True  # type: ignore[attr-defined]
+    reaches_end.terminal = True  # type: ignore[attr-defined]
     turns.terminal = True  # type: ignore[attr-defined]
-    events = [there, turns] if rubs(model) else [there]
+    events = [reaches_end, turns] if rubs(model) else [reaches_end]
     accuracy: Any = {"rtol": ACCURACY, "atol": 1e-13}
     t, state, legs, reached = 0.0, np.array([start, speed]), [], False
     while t < duration and not reached:
@@ -217,16 +217,16 @@ def free_motion(
             break
 
         def rate(t: float, state: Floats, sense: int = sense) -> list[float]:
-            found, mass = pull(t, state, sense)
-            return [state[1], found / mass]
+            total, mass = pull(t, state, sense)
+            return [state[1], total / mass]
 
         turns.direction = -sense  # type: ignore[attr-defined]
-        found = solve_ivp(rate, (t, duration), state, "DOP853", events=events, **accuracy)
-        if not found.success:
-            raise model.refusal("release", "the motion has no solution", found.message)
-        legs.append((found.t, found.y))
-        reached = found.status == 1 and bool(abs(found.y[0, -1] - until) < NEAR)
-        t, state = float(found.t[-1]), np.array([found.y[0, -1], 0.0])
+        solution = solve_ivp(rate, (t, duration), state, "DOP853", events=events, **accuracy)
+        if not solution.success:
+            raise model.refusal("release", "the motion has no solution", solution.message)
+        legs.append((solution.t, solution.y))
+        reached = solution.status == 1 and bool(abs(solution.y[0, -1] - until) < NEAR)
+        t, state = float(solution.t[-1]), np.array([solution.y[0, -1], 0.0])
     time, (s, rates) = (np.concatenate(parts, axis=-1) for parts in zip(*legs, strict=True))
     _check_strokes(model, s, until)
     return FreeMotion(time, s, rates, reached)

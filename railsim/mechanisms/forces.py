@@ -156,9 +156,9 @@ def _first_lane(motion: Motion, values: Any) -> Any:
     return np.real(values).reshape(-1, motion.s.shape[-1])[0]
 
 
-def _gas_push(motion: Motion, name: str, gas: parts.GasSpring, moved: Any, rates: Rates) -> Any:
+def _gas_push(motion: Motion, name: str, gas: parts.GasSpring, course: Any, rates: Rates) -> Any:
     n = motion.model.number
-    length, slope, speed = moved
+    length, slope, speed = course
     stroke, extended = n(gas.stroke), n(gas.extended)
     compressed = extended - length
     if not rates.trial:
@@ -345,7 +345,7 @@ def chamber_area(model: Model, cylinder: parts.Cylinder, acts: str) -> Any:
     return count * 0.25 * np.pi * free
 
 
-def applied(motion: Motion, forces: Mapping[str, Any], rates: Rates = AT_REST) -> Any:
+def applied_forces(motion: Motion, forces: Mapping[str, Any], rates: Rates = AT_REST) -> Any:
     """Applied forces, those of the actuators by name, less inertia, (position, 3 n_bodies)."""
     model = motion.model
     actuators = model.definition.actuators
@@ -397,6 +397,6 @@ def reactions(
     residual = np.zeros((len(motion.s), rows))
     jacobian = np.zeros((len(motion.s), rows, rows))
     motion_kernel.jacobians(model.linkage, motion.s, motion.q, motion.arcs, residual, jacobian)
-    right = -applied(motion, forces, rates)
+    right = -applied_forces(motion, forces, rates)
     found = np.linalg.solve(jacobian.transpose(0, 2, 1), right[..., None])[..., 0]
     return {name: found[:, a:b] for name, (a, b) in model.joint_rows.items()}, found[:, -1]

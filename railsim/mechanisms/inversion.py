@@ -24,12 +24,12 @@ def driver_at(motion: Motion, quantity: Quantity, values: ArrayLike) -> Floats:
     The first crossing along the motion counts, whose positions must be dense enough to bracket the
     values; Newton's method within its bracket.
     """
-    wanted = np.atleast_1d(np.asarray(values, dtype=float))
+    targets = np.atleast_1d(np.asarray(values, dtype=float))
     known, _ = quantity(motion)
     size = float(np.ptp(known)) or 1.0
-    low, high = np.full(len(wanted), np.nan), np.full(len(wanted), np.nan)
-    guess = np.full(len(wanted), np.nan)
-    for i, value in enumerate(wanted):
+    low, high = np.full(len(targets), np.nan), np.full(len(targets), np.nan)
+    guess = np.full(len(targets), np.nan)
+    for i, value in enumerate(targets):
         gap = known - value
         crossed = np.flatnonzero(gap[:-1] * gap[1:] <= 0.0)
         begins, ends = np.abs(gap[[0, -1]]) <= 1e-12 * size
@@ -40,14 +40,14 @@ def driver_at(motion: Motion, quantity: Quantity, values: ArrayLike) -> Floats:
             low[i], high[i] = motion.s[k], motion.s[k + 1]
             share = gap[k] / (gap[k] - gap[k + 1]) if gap[k] != gap[k + 1] else 0.5
             guess[i] = low[i] + share * (high[i] - low[i])
-    there = np.isfinite(guess)
-    bracket = (low[there], high[there])
-    guess[there] = _refined(motion.model, quantity, wanted[there], guess[there], bracket, size)
+    has = np.isfinite(guess)
+    bracket = (low[has], high[has])
+    guess[has] = _refine(motion.model, quantity, targets[has], guess[has], bracket, size)
     return guess
 
 
-def _refined(
-    model: Model, quantity: Quantity, wanted: Floats, s: Floats, bracket: Any, size: float
+def _refine(
+    model: Model, quantity: Quantity, targets: Floats, s: Floats, bracket: Any, size: float
 ) -> Floats:
     left, right = np.sort(bracket, axis=0)
     span = max(abs(model.end - model.start), 1e-300)
@@ -56,10 +56,10 @@ def _refined(
             break
         value, slope = quantity(solve(model, s))
         with np.errstate(divide="ignore", invalid="ignore"):
-            step = (value - wanted) / slope
+            step = (value - targets) / slope
         new = np.where(np.isfinite(step), np.clip(s - step, left, right), s)
         done = np.all(np.abs(new - s) <= 1e-15 * span) or np.all(
-            np.abs(value - wanted) <= 1e-15 * size
+            np.abs(value - targets) <= 1e-15 * size
         )
         s = new
         if done:
@@ -72,9 +72,9 @@ def zeros(motion: Motion, function: Callable[[Motion], Any]) -> list[float]:
     known = np.asarray(function(motion))
     # the known ones again, or rounding may give a zero at a position the sign of the other end
     values: dict[float, float] = dict(zip(motion.s.tolist(), known.tolist(), strict=True))
-    found = []
+    roots = []
 
-    def at(s: float) -> float:
+    def value_at(s: float) -> float:
         if s not in values:
             values[s] = float(np.ravel(function(solve(motion.model, [s])))[0])
         return values[s]
@@ -82,15 +82,15 @@ def zeros(motion: Motion, function: Callable[[Motion], Any]) -> list[float]:
     for k in range(len(known) - 1):
         a, b = known[k], known[k + 1]
         if a == 0.0:
-            found.append(float(motion.s[k]))
+            roots.append(float(motion.s[k]))
         elif a * b < 0.0:
             from scipy.optimize import brentq  # imported where it is needed: it takes a while
 
             span = abs(motion.model.end - motion.model.start)
-            found.append(float(brentq(at, motion.s[k], motion.s[k + 1], xtol=1e-12 * span)))
+            roots.append(float(brentq(value_at, motion.s[k], motion.s[k + 1], xtol=1e-12 * span)))
     if len(known) and known[-1] == 0.0:
-        found.append(float(motion.s[-1]))
-    return found
+        roots.append(float(motion.s[-1]))
+    return roots
 
 
 def largest(motion: Motion, function: Callable[[Motion], Any], known: Any) -> tuple[float, float]:

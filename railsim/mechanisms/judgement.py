@@ -92,18 +92,18 @@ class Judge:
     def __init__(self, definition: Mechanism, every: int = 1) -> None:
         assert definition.optimise is not None
         self.definition = definition
-        self.wanted: Optimise = definition.optimise
-        self.names = list(self.wanted.bounds)
+        self.problem: Optimise = definition.optimise
+        self.names = list(self.problem.bounds)
         self.values = parameter_values(definition)
-        bounds = [[number(b, self.values) for b in self.wanted.bounds[n]] for n in self.names]
+        bounds = [[number(b, self.values) for b in self.problem.bounds[n]] for n in self.names]
         self.lower, self.upper = np.array(bounds, dtype=float).T
         self.unknown = definition.held_by
         self.pair = length_points(definition)
         self.output = definition.output.point if definition.output is not None else None
-        kind = self.wanted.objective
+        kind = self.problem.objective
         self.weights = {kind: 1.0} if isinstance(kind, str) else dict(kind)
         # over the whole travel, wherever that takes the output, or at heights of the output
-        everywhere = self.wanted.range == "travel" and "follow" not in self.weights
+        everywhere = self.problem.range == "travel" and "follow" not in self.weights
         self.by_share = self.output is None or everywhere
         self._check_length()
         full = positions(definition)
@@ -120,34 +120,34 @@ class Judge:
 
     def _check_length(self) -> None:
         """Refuse what needs the length of an actuator or an output where there is none."""
-        wanted, found = self.wanted, []
+        problem, found = self.problem, []
         if self.pair is None or self.output is None:
             missing = "no actuator between two points, or no [output]"
             ratios = self.weights.keys() & {"follow", "constant", "linear"}
             found = [("objective", f"'{kind}': {missing}") for kind in sorted(ratios)]
         if self.pair is None:
-            keys = [k for k in ("min_length", "max_stroke") if getattr(wanted, k) is not None]
+            keys = [k for k in ("min_length", "max_stroke") if getattr(problem, k) is not None]
             found += [(key, "no actuator between two points") for key in keys]
         remedy = "[solve] must name one; 'peak_force' and 'constant_force' do without"
         name = self.definition.name
         Faults(Fault(name, f"optimise.{key}", words, remedy) for key, words in found).check()
 
-    def named(self, x: Sequence[float] | Floats) -> dict[str, float]:
+    def by_name(self, x: Sequence[float] | Floats) -> dict[str, float]:
         """Values of the parameters that may change, by their names."""
         return dict(zip(self.names, map(float, x), strict=True))
 
     def point_of(self, values: Mapping[str, Any]) -> tuple[Floats, dict[str, float]]:
         """Those of some values that may change, and those that choose an assembly."""
-        choice = {name: float(values[name]) for name in self.wanted.assemblies}
+        choice = {name: float(values[name]) for name in self.problem.assemblies}
         return np.array([float(values[name]) for name in self.names]), choice
 
     def model(self, x: Sequence[float] | Floats, choice: dict[str, float]) -> Model:
         """The model with its lanes for values of the parameters that may change."""
-        return build(self.definition, {**self.fixed, **choice, **with_lanes(self.named(x))})
+        return build(self.definition, {**self.fixed, **choice, **with_lanes(self.by_name(x))})
 
     def real_model(self, x: Sequence[float] | Floats, choice: dict[str, float]) -> Model:
         """The same without lanes."""
-        return build(self.definition, {**self.fixed, **choice, **self.named(x)})
+        return build(self.definition, {**self.fixed, **choice, **self.by_name(x)})
 
     def grid(self, model: Model, extra: Sequence[float] = ()) -> Floats:
         """Values of the driver at which constraints are held; `extra` are shares of the travel."""
@@ -158,8 +158,8 @@ class Judge:
         self, x: Floats, choice: dict[str, float], extra: Sequence[float] = ()
     ) -> Judgement:
         """Judge values of the parameters; raises InputError: the links cannot be assembled."""
-        moved = self.model(x, choice)
-        model = moved.real()
+        laned = self.model(x, choice)
+        model = laned.real()
         grid = self.grid(model, extra)
         if self.by_share:
             s = model.start + (model.end - model.start) * self.positions.share
@@ -168,12 +168,12 @@ class Judge:
         both = np.concatenate((grid, s))
         later = np.repeat((0, 1), (len(grid), len(s)))
         at_height = (later == 1) & (not self.by_share)  # whatever the ends of the range are
-        drift = np.where(at_height, 0.0, moved.drift(both))
+        drift = np.where(at_height, 0.0, laned.drift(both))
         later[len(grid) - 1] = 2  # of equal values the range's own are the first and the last
         order = np.lexsort((later, model.sense * both))
-        motion = tangents(solve(model, both[order]), moved, drift=drift[..., order], second=False)
+        motion = tangents(solve(model, both[order]), laned, drift=drift[..., order], second=False)
         rank = np.argsort(order, kind="stable")
-        return self._judged(motion, model, rank[: len(grid)], rank[len(grid) :])
+        return self._judge(motion, model, rank[: len(grid)], rank[len(grid) :])
 
     def least(
         self, x: Floats, choice: dict[str, float], near: float = 0.02
@@ -184,22 +184,22 @@ class Judge:
         """
         model = self.real_model(x, choice)
         motion = solve(model, np.linspace(model.start, model.end, DENSE))
-        found: dict[str, tuple[float, float]] = {}
-        for i, (name, _, known) in enumerate(self._everywhere(motion)):
+        least: dict[str, tuple[float, float]] = {}
+        for i, (name, _, margins) in enumerate(self._everywhere(motion)):
 
             def less(m: Motion, i: int = i) -> Any:
                 return -next(row for k, row in enumerate(self._everywhere(m)) if k == i)[2]
 
-            k = int(np.argmin(known))
-            at, margin = float(motion.s[k]), float(known[k])
+            k = int(np.argmin(margins))
+            place, margin = float(motion.s[k]), float(margins[k])
             if margin < near:
-                at, negative = largest(motion, less, -known)
+                place, negative = largest(motion, less, -margins)
                 margin = -negative
-            if name not in found or margin < found[name][0]:
-                found[name] = margin, (at - model.start) / (model.end - model.start)
-        return found
+            if name not in least or margin < least[name][0]:
+                least[name] = margin, (place - model.start) / (model.end - model.start)
+        return least
 
-    def _judged(self, motion: Motion, model: Model, grid: Any, zone: Any) -> Judgement:
+    def _judge(self, motion: Motion, model: Model, grid: Any, zone: Any) -> Judgement:
         force = self._force(motion)
         ratio = 0.0 * force
         if self.pair is not None and self.output is not None:
@@ -267,10 +267,10 @@ class Judge:
             if kind == "follow":
                 parts.append(root * (ratio - self.positions.ratio))
             elif kind in ("constant", "linear"):
-                assert self.wanted.target is not None
-                target = number(self.wanted.target, self.values)
+                assert self.problem.target is not None
+                target = number(self.problem.target, self.values)
                 if kind == "linear":
-                    slope = number(self.wanted.slope, self.values)
+                    slope = number(self.problem.slope, self.values)
                     target = target + slope * height
                 parts.append(root * (ratio - target))
             elif kind == "constant_force":
@@ -285,20 +285,20 @@ class Judge:
     def _margins(self, motion: Motion, grid: Any) -> Any:
         """Margins of all constraints, shape (lane, constraint), and their labels."""
         found = [(name, scale, m[..., grid]) for name, scale, m in self._everywhere(motion)]
-        if self.wanted.max_stroke is not None:
+        if self.problem.max_stroke is not None:
             assert self.pair is not None
             length = motion.length(self.pair)[0][..., grid]
             stroke = length[..., -1:] - length[..., :1]
             stroke = np.where(np.real(stroke) > 0.0, 1.0, -1.0) * stroke
-            found.append(("max_stroke", 1.0, motion.model.number(self.wanted.max_stroke) - stroke))
+            found.append(("max_stroke", 1.0, motion.model.number(self.problem.max_stroke) - stroke))
         self.labels = [(name, scale) for name, scale, m in found for _ in range(m.shape[-1])]
         return np.concatenate([margin for _, _, margin in found], axis=-1)
 
     def _everywhere(self, motion: Motion) -> Iterator[tuple[str, float, Any]]:
         """Constraints at all positions: name, scale, margins of shape (..., position)."""
-        n, wanted = motion.model.number, self.wanted
-        if wanted.min_transmission_angle is not None:
-            limit = n(wanted.min_transmission_angle)
+        n, problem = motion.model.number, self.problem
+        if problem.min_transmission_angle is not None:
+            limit = n(problem.min_transmission_angle)
             for name, angle in motion.model.definition.angles.items():
                 if angle.limited:
                     sine = np.sin(motion.angle(name))
@@ -306,8 +306,8 @@ class Judge:
                     yield name, 1.0, (sine * sine - np.sin(limit) ** 2) / np.sin(2.0 * limit)
         if self.pair is not None:
             length, rate, _ = motion.length(self.pair)
-            if wanted.min_length is not None:
-                yield "min_length", 1.0, length - n(wanted.min_length)
+            if problem.min_length is not None:
+                yield "min_length", 1.0, length - n(problem.min_length)
             mean = (length[..., -1:] - length[..., :1]) / (motion.s[..., -1:] - motion.s[..., :1])
             yield "dead_point", 1.0, rate / mean - SLOWEST
             yield "dead_point", 1.0, 1.0 - SLOWEST * rate / mean  # of the driver
@@ -316,7 +316,7 @@ class Judge:
             yield "dead_point", 1.0, work / np.mean(work, axis=-1, keepdims=True) - SLOWEST
         yield from self._forces(motion)
         yield from self._strokes(motion)
-        for i, box in enumerate(wanted.envelope):
+        for i, box in enumerate(problem.envelope):
             for point in box.points:
                 r = motion.point(point)[0]
                 for axis, limits in ((0, box.x), (1, box.y)):
@@ -327,7 +327,7 @@ class Judge:
 
     def _forces(self, motion: Motion) -> Iterator[tuple[str, float, Any]]:
         """The available force in both senses; what can only push must not pull."""
-        limit, unknown = self.wanted.available_force, self.unknown
+        limit, unknown = self.problem.available_force, self.unknown
         one_sided = isinstance(unknown, AirSpring) or (
             isinstance(unknown, Cylinder) and unknown.acts != "both"
         )

@@ -16,7 +16,7 @@ from railsim.definitions.mechanism.expressions import atan2
 from railsim.errors import Fault, InputError, input_error
 from railsim.kernels import linkage as kernel
 from railsim.kernels import linkage_motion as motion_kernel
-from railsim.mechanisms.assembly import assembled, constraints, dead_loop, open_loop
+from railsim.mechanisms.assembly import assemble, constraints, dead_loop, open_loop
 from railsim.mechanisms.model import STEP, Model
 
 T = TypeVar("T")
@@ -138,7 +138,7 @@ def solve(model: Model, s: ArrayLike, near: Motion | None = None) -> Motion:
     tracked = _track(model, values, pose, arc_start)
     astray = np.max(np.abs(tracked.q[0, :, 2] - pose[:, 2])) > ASTRAY
     if near is None and (tracked.status == kernel.NO_ASSEMBLY or astray):
-        found = assembled(model, start, pose, arc_start)
+        found = assemble(model, start, pose, arc_start)
         if found is not None:
             tracked = _track(model, values, found, arc_start)
     if tracked.status != kernel.OK:
@@ -170,35 +170,35 @@ def _track(model: Model, s: Floats, pose: Floats, arc_start: Integers) -> _Track
 
 def _fault(model: Model, tracked: _Tracked, s: Floats, pose: Floats) -> Fault:
     """Why a motion cannot be continued: the loop that cannot close, or is at a dead point."""
-    at = float(tracked.failure[0])
+    place = float(tracked.failure[0])
     row = model.linkage.joint[int(tracked.failure[1]), 3]
     name = next(name for name, (a, b) in model.joint_rows.items() if a <= row < b)
     q, arcs = pose, model.linkage.joint[:, 4].copy()
     if tracked.valid:
         q, arcs = tracked.q[tracked.valid - 1], tracked.arcs[tracked.valid - 1]
     status = tracked.status
-    if status == kernel.NO_ASSEMBLY and (closed := assembled(model, at, q, arcs)) is not None:
+    if status == kernel.NO_ASSEMBLY and (closed := assemble(model, place, q, arcs)) is not None:
         status, q = kernel.DEAD_POINT, closed
     sentence = kernel.STATUS[status].format(joint=f"'{name}'")
     loop = None
     if status in (kernel.NO_ASSEMBLY, kernel.LOST_ASSEMBLY):
-        far = at if status == kernel.NO_ASSEMBLY else float(s[-1])
-        loop = open_loop(model, at + BEYOND * (far - at), q, arcs)
+        far = place if status == kernel.NO_ASSEMBLY else float(s[-1])
+        loop = open_loop(model, place + BEYOND * (far - place), q, arcs)
         if loop is None and status == kernel.LOST_ASSEMBLY:  # nothing stays open behind it
             status = kernel.DEAD_POINT
             sentence = kernel.STATUS[status]
     if loop is not None:
         # behind the limit the gap is still small: the end of the range says more
         end = ""
-        if far != at and (last := open_loop(model, far, q, arcs, loop)) is not None:
+        if far != place and (last := open_loop(model, far, q, arcs, loop)) is not None:
             loop, end = last, f" at {driver_words(model, far)}"
         name = loop.blamed
         sentence = f"{sentence.partition(' (joint')[0]}; {loop}{end}"
     elif status in (kernel.DEAD_POINT, kernel.BRANCH_JUMP):
-        loop_names = dead_loop(model, at, q, arcs)
+        loop_names = dead_loop(model, place, q, arcs)
         name = loop_names[-1] if name not in loop_names else name
         sentence = f"{sentence.partition(' (joint')[0]} (joints {', '.join(loop_names)})"
-    where = f"driver at {driver_words(model, at)}"
+    where = f"driver at {driver_words(model, place)}"
     remedy = {
         kernel.NO_ASSEMBLY: "other lengths, or a pose in [start] nearer to the assembly",
         kernel.BEYOND_CAM: "a longer arc, or another driver.end",
@@ -222,15 +222,15 @@ def check_freedom(model: Model) -> None:
         pose, arcs = motion.q[0], motion.arcs[0]
     except InputError as error:
         lost = error
-        found = assembled(model, model.start, model.pose, arcs)
+        found = assemble(model, model.start, model.pose, arcs)
         pose = model.pose if found is None else found
-    left, rank = _held(model, model.start, pose, arcs)
+    left, rank = _joint_rank(model, model.start, pose, arcs)
     rows = 3 * model.linkage.n_bodies
     if rank < rows - 1 and lost is not None:
         # a dead point at the start alone is no joint too many
         beyond = model.start + 0.01 * (model.end - model.start)
-        other = assembled(model, beyond, pose, arcs)
-        if other is not None and _held(model, beyond, other, arcs)[1] == rows - 1:
+        other = assemble(model, beyond, pose, arcs)
+        if other is not None and _joint_rank(model, beyond, other, arcs)[1] == rows - 1:
             raise lost
     if rank == rows - 1:
         if lost is not None:
@@ -243,28 +243,28 @@ def check_freedom(model: Model) -> None:
     raise input_error(model.definition.name, where, "1 is needed", "joints")
 
 
-def _held(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[Any, int]:
+def _joint_rank(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[Any, int]:
     """Left singular vectors and rank of the joints' Jacobian."""
     left, singular, _ = np.linalg.svd(constraints(model, s, pose, arcs)[1][:-1])
     return left, int(np.sum(singular > 1e-9 * singular[0]))
 
 
 def tangents(
-    motion: Motion, moved: Model, *, drift: Floats | float = 0.0, second: bool = True
+    motion: Motion, lanes: Model, *, drift: Floats | float = 0.0, second: bool = True
 ) -> Motion:
     """The same positions with derivatives by parameters in the imaginary parts.
 
-    `motion`: Positions of a real model. `moved`: The model with a lane for each parameter
+    `motion`: Positions of a real model. `lanes`: The model with a lane for each parameter
     (`Model.lanes`); an imaginary part of a result is `STEP` times the derivative. `drift` (shape
     (lane, position)): Derivatives of the driver's values themselves. `second`: Whether the second
     derivatives by the driver are wanted too.
     """
-    count = moved.linkage.point.shape[0]
+    count = lanes.linkage.point.shape[0]
     real = motion.s, motion.q, motion.q1, motion.q2
     s, q, q1, q2 = (np.repeat(array[None].astype(complex), count, axis=0) for array in real)
     s += 1j * STEP * drift
-    motion_kernel.tangents(motion.model.linkage, moved.linkage, s, q, q1, q2, motion.arcs, second)
-    return Motion(moved, s, q, q1, q2, motion.arcs)
+    motion_kernel.tangents(motion.model.linkage, lanes.linkage, s, q, q1, q2, motion.arcs, second)
+    return Motion(lanes, s, q, q1, q2, motion.arcs)
 
 
 def derivative(values: Any) -> Floats:

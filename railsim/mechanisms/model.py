@@ -105,9 +105,9 @@ class Model:
         return rows
 
 
-def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Model:
-    """Return the model with values `changed`; raises InputError: an expression has no value."""
-    values = parameter_values(definition, changed)
+def build(definition: Mechanism, changes: Mapping[str, Any] | None = None) -> Model:
+    """Return the model with values `changes`; raises InputError: an expression has no value."""
+    values = parameter_values(definition, changes)
     lanes = max((np.size(v) for v in values.values()), default=1)
     complex_values = any(np.iscomplexobj(v) for v in values.values())
     arrays = _Arrays(definition, values, lanes, complex if complex_values else float)
@@ -141,7 +141,7 @@ class _Arrays:
         self.body_of = [self.bodies[body_name(name)] for name in self.points]
         positions = list(definition.ground.points.values())
         positions += [w for body in definition.bodies.values() for w in body.points.values()]
-        self.position = [self._filled(coordinates(where, values)) for where in positions]
+        self.position = [self._by_lane(coordinates(where, values)) for where in positions]
         self.joint: list[list[int]] = []
         self.value: list[Any] = []
         self.arc_point: list[int] = []
@@ -151,7 +151,7 @@ class _Arrays:
         for joint in definition.joints.values():
             self._add(joint)
 
-    def _filled(self, numbers: Sequence[Any]) -> NDArray[Any]:
+    def _by_lane(self, numbers: Sequence[Any]) -> NDArray[Any]:
         """Numbers as an array, shape (lane, number)."""
         filled: NDArray[Any] = np.zeros((self.lanes, len(numbers)), dtype=self.dtype)
         for i, value in enumerate(numbers):
@@ -164,7 +164,7 @@ class _Arrays:
     def _add(self, joint: Any) -> None:
         def rows(kind: int, pair: Sequence[int], values: Sequence[Any], arcs: Any = (0, 0)) -> None:
             self.joint.append([kind, *pair, self.row, *arcs])
-            self.value.append(self._filled(values))
+            self.value.append(self._by_lane(values))
             self.row += 2 if kind == kernel.REVOLUTE else 1
 
         if isinstance(joint, Cam):
@@ -195,9 +195,9 @@ class _Arrays:
             arcs = tangent_arcs(cam, start[:, :1], start[:, 1:], self.values)
         for x, y, radius, ends in arcs:
             self.arc_point.append(len(self.position))
-            self.position.append(self._filled((x, y)))
+            self.position.append(self._by_lane((x, y)))
             self.body_of.append(body)
-            self.arc_radius.append(self._filled((radius,))[:, 0])
+            self.arc_radius.append(self._by_lane((radius,))[:, 0])
             self.arc_ends.append(ends)
         return body
 
@@ -221,7 +221,7 @@ class _Arrays:
             np.ascontiguousarray(np.array(self.value).transpose(1, 0, 2)),
             np.array(self.arc_point, dtype=np.int64), np.ascontiguousarray(radii.T),
             np.array(self.arc_ends, dtype=float).reshape(-1, 5), np.array(drive, dtype=np.int64),
-            self._filled((self._number(driver.zero),))[:, 0],
+            self._by_lane((self._number(driver.zero),))[:, 0],
         )  # fmt: skip
 
 

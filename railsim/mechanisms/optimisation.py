@@ -72,13 +72,13 @@ def optimise(
     if definition.optimise is None:
         fault = Fault(definition.name, "optimise", "missing", "the table [optimise] is needed")
         raise InputError([fault])
-    wanted = definition.optimise
-    count = wanted.starts if starts is None else starts
+    problem = definition.optimise
+    count = problem.starts if starts is None else starts
     if count > MOST_STARTS:
         time = duration_in_words(SECONDS_PER_START * count / workers)
         fault = argument_fault("starts", "", f"{count:,}, some {time}", f"{MOST_STARTS:,} at most")
         raise InputError([fault])
-    chosen_seed = wanted.seed if seed is None else seed
+    chosen_seed = problem.seed if seed is None else seed
     for name, value, least in (("starts", count, 1), ("seed", chosen_seed, 0)):
         if value < least:
             raise argument_error(name, f"found {value}", f"{least} at least")
@@ -99,19 +99,19 @@ def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict
     turns.
     """
     generator = np.random.default_rng(seed)
-    assemblies = judge.wanted.assemblies
+    assemblies = judge.problem.assemblies
     values = ([float(number(v, judge.values)) for v in each] for each in assemblies.values())
     choices = [dict(zip(assemblies, members, strict=True)) for members in product(*values)]
     written, choice = judge.point_of(judge.values)
-    found = [(np.clip(written, judge.lower, judge.upper), choice)]
+    points = [(np.clip(written, judge.lower, judge.upper), choice)]
     for i in range(1, count):
         choice = choices[i % len(choices)]
         for _ in range(DRAWS):
             x = generator.uniform(judge.lower, judge.upper)
             if _assembles(judge, x, choice):
                 break
-        found.append((x, choice))
-    return found
+        points.append((x, choice))
+    return points
 
 
 def _assembles(judge: Judge, x: Floats, choice: dict[str, float]) -> bool:
@@ -184,13 +184,13 @@ class _Problem:
 
 
 def _between(
-    judge: Judge, x: Floats, choice: dict[str, float], known: float = 0.0
+    judge: Judge, x: Floats, choice: dict[str, float], known_breach: float = 0.0
 ) -> tuple[float, list[float]]:
     """Largest breach of a constraint at any position, and where it is larger than a known one."""
-    found = [(firm(name), *least) for name, least in judge.least(x, choice).items()]
-    most = max((float(breach(margin, fixed)) for fixed, margin, _ in found), default=0.0)
-    allowed = [0.1 * FEASIBLE + (not fixed) * known for fixed, _, _ in found]
-    return most, [s for (_, m, s), limit in zip(found, allowed, strict=True) if -m > limit]
+    breaches = [(firm(name), *least) for name, least in judge.least(x, choice).items()]
+    most = max((float(breach(margin, fixed)) for fixed, margin, _ in breaches), default=0.0)
+    allowed = [0.1 * FEASIBLE + (not fixed) * known_breach for fixed, _, _ in breaches]
+    return most, [s for (_, m, s), limit in zip(breaches, allowed, strict=True) if -m > limit]
 
 
 def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]) -> Start:
@@ -198,7 +198,7 @@ def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]
     index, begin, choice = job
     problem = _Problem(judge, choice)
     u = np.clip((begin - judge.lower) / problem.span, 0.0, 1.0)
-    named = judge.named(begin) | choice
+    named = judge.by_name(begin) | choice
     here = problem(u)
     if here is None:
         return Start(index, named, named, np.nan, np.nan, problem.evaluations)
@@ -215,7 +215,7 @@ def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]
         if judged is None:
             break
         u, here = _rounds(problem, u, judged, effort)
-    end = judge.named(judge.lower + u * problem.span) | choice
+    end = judge.by_name(judge.lower + u * problem.span) | choice
     return Start(index, named, end, here.objective, violation, problem.evaluations)
 
 
@@ -257,26 +257,26 @@ def _round(problem: _Problem, u0: Floats, here: Judgement, steps: int) -> Floats
     R = np.linalg.qr(np.vstack((J, damping * np.eye(m))), mode="r")
     S = np.linalg.inv(R)
 
-    def at(z: Floats) -> Judgement | None:
+    def judgement_at(z: Floats) -> Judgement | None:
         return problem(np.clip(u0 + S @ z, 0.0, 1.0))
 
     def objective(z: Floats) -> float:
-        found = at(z)
+        found = judgement_at(z)
         return REFUSED if found is None else found.objective / scale
 
     def gradient(z: Floats) -> Floats:
-        found = at(z)
+        found = judgement_at(z)
         slope: Floats = S.T @ (here if found is None else found).gradient / scale
         return slope
 
     def margins(z: Floats) -> Floats:
-        found = at(z)
+        found = judgement_at(z)
         u = u0 + S @ z
         inner = -np.ones_like(here.margins) if found is None else found.margins
         return np.concatenate((inner, u, 1.0 - u))
 
     def slopes(z: Floats) -> Floats:
-        known = at(z) or here
+        known = judgement_at(z) or here
         return np.vstack((known.slopes @ S, S, -S))
 
     inequality: Any = {"type": "ineq", "fun": margins, "jac": slopes}

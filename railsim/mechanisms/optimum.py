@@ -87,7 +87,7 @@ def optimum_of(
     """Return the best of all starts with what is active there."""
     x, choice = judge.point_of(best.end)
     least = judge.least(x, choice)
-    judged = judge(x, choice, [share for margin, share in least.values() if margin < ACTIVE])
+    judgement = judge(x, choice, [share for margin, share in least.values() if margin < ACTIVE])
     listed = {
         name: tuple(names) for name, names in definition.provenance.items() if name != "optimised"
     }
@@ -106,31 +106,31 @@ def optimum_of(
     breaches = {
         name: -margin * scales[name] for name, (margin, _) in least.items() if margin < -FEASIBLE
     }
-    for (name, scale), margin in zip(judge.labels, judged.margins, strict=True):
+    for (name, scale), margin in zip(judge.labels, judgement.margins, strict=True):
         if margin < -FEASIBLE:
             breaches[name] = max(breaches.get(name, 0.0), -float(margin) * scale)
-    if (wanted := judge.wanted.min_transmission_angle) is not None:
-        limit, angles = after.model.number(wanted), after.min_angles
+    if (angle := judge.problem.min_transmission_angle) is not None:
+        limit, angles = after.model.number(angle), after.min_angles
         for name in breaches.keys() & angles.keys():  # margins are of the squares of their sines
             breaches[name] = max(limit - angles[name], 0.0)
-    kept, active = best.feasible and not breaches, _active(judge, judged, x)
-    values = judged.objective, own, objective_before, kept_before
+    kept, active = best.feasible and not breaches, _active(judge, judgement, x)
+    values = judgement.objective, own, objective_before, kept_before
     return Optimum(better, before, after, *values, kept, breaches, active, starts, seed)
 
 
-def _active(judge: Judge, judged: Judgement, x: Floats) -> tuple[Active, ...]:
+def _active(judge: Judge, judgement: Judgement, x: Floats) -> tuple[Active, ...]:
     """Limits that hold the optimum: their slack, and multipliers by least squares."""
     rows: list[tuple[str, str, float, Floats]] = []
     span = judge.upper - judge.lower
     seen: dict[str, int] = {}
     for i, (name, _) in enumerate(judge.labels):
-        if judged.margins[i] < ACTIVE and (
-            name not in seen or judged.margins[i] < judged.margins[seen[name]]
+        if judgement.margins[i] < ACTIVE and (
+            name not in seen or judgement.margins[i] < judgement.margins[seen[name]]
         ):
             seen[name] = i
     for name, i in seen.items():
         scale = judge.labels[i][1]
-        rows.append((name, "", float(judged.margins[i]) * scale, judged.slopes[i] * scale))
+        rows.append((name, "", float(judgement.margins[i]) * scale, judgement.slopes[i] * scale))
     for k, name in enumerate(judge.names):
         unit = np.eye(len(x))[k]
         if x[k] - judge.lower[k] < ACTIVE * span[k]:
@@ -143,7 +143,7 @@ def _active(judge: Judge, judged: Judgement, x: Floats) -> tuple[Active, ...]:
     norms = np.linalg.norm(matrix, axis=0)
     norms[norms == 0.0] = 1.0
     # where several positions have the largest force, a mean of their gradients is in balance
-    smooth, rivals = judged.gradient - judged.peak_gradient, judged.rivals
+    smooth, rivals = judgement.gradient - judgement.peak_gradient, judgement.rivals
     peaks = ((smooth if rivals is None else smooth + rivals) * span).reshape(-1, len(x)).T
     large = 1e3 * float(np.linalg.norm(peaks)) or 1.0
     sums = np.repeat((0.0, large), (len(rows), peaks.shape[1]))

@@ -40,7 +40,7 @@ def equal_lengths(dense: Motion, pair: tuple[str, str], edges: Any, count: int) 
     return driver_at(dense, lambda motion: motion.length(pair)[:2], wanted)
 
 
-def sampled(dense: Motion) -> Floats:
+def sampling_positions(dense: Motion) -> Floats:
     """Values of the driver at the positions that `[sampling]` asks for."""
     model, sampling = dense.model, dense.model.definition.sampling
     name, pair = actuator_of(model.definition), length_points(model.definition)
@@ -63,51 +63,51 @@ def outputs(motion: Motion) -> dict[str, Any]:
     """Named results at all positions of a motion, SI; names and units in `quantities`."""
     model = motion.model
     definition = model.definition
-    found: dict[str, Any] = {"travel": motion.s}
+    results: dict[str, Any] = {"travel": motion.s}
     pair = length_points(definition)
     if pair is not None:
-        found["length"], found["rate"], _ = motion.length(pair)
+        results["length"], results["rate"], _ = motion.length(pair)
     if definition.output is not None:
         r, r1, _ = motion.point(definition.output.point)
         closed = solve(model, [model.start]).point(definition.output.point)[0][0]
-        found["height"], found["x"] = r[:, 1] - closed[1], r[:, 0] - closed[0]
+        results["height"], results["x"] = r[:, 1] - closed[1], r[:, 0] - closed[0]
         if pair is not None:
             with np.errstate(divide="ignore", invalid="ignore"):  # where the length stands still
-                ratios = (r1[:, k] / found["rate"] for k in (model.axis, 0))
-                found["ratio"], found["ratio_x"] = ratios
+                ratios = (r1[:, k] / results["rate"] for k in (model.axis, 0))
+                results["ratio"], results["ratio_x"] = ratios
     if definition.solve is not None:
-        found |= _forces(motion, definition.unknown)
+        results |= _forces(motion, definition.unknown)
     for name, element in definition.elements.items():
         pair = ends(element)
         if pair is not None:
-            found[f"{name}_length"] = motion.length(pair)[0]
-            found[f"{name}_force"] = forces.element_push(motion, name)
+            results[f"{name}_length"] = motion.length(pair)[0]
+            results[f"{name}_force"] = forces.element_push(motion, name)
             if isinstance(element, GasSpring) and element.rod is not None:
                 area = 0.25 * np.pi * model.number(element.rod) ** 2
-                found[f"{name}_pressure"] = np.abs(found[f"{name}_force"]) / area
-    found |= {name: motion.angle(name) for name in definition.angles}
+                results[f"{name}_pressure"] = np.abs(results[f"{name}_force"]) / area
+    results |= {name: motion.angle(name) for name in definition.angles}
     for name, row in cam_rows(motion).items():
-        found[f"{name}_pressure_angle"] = _pressure_angle(motion, name, row)
-    return found
+        results[f"{name}_pressure_angle"] = _pressure_angle(motion, name, row)
+    return results
 
 
 def _forces(motion: Motion, unknown: str) -> dict[str, Any]:
     """Force of the unknown actuator, its pressure, what it means at the output."""
     model = motion.model
     definition = model.definition
-    found: dict[str, Any] = {}
+    results: dict[str, Any] = {}
     for way, sense in (("", 1), ("_back", -1))[: 2 if forces.rubs(model) else 1]:
         rates = forces.Rates(friction=sense * model.sense)
-        found[f"force{way}"] = forces.actuator_force(motion, unknown, rates)
+        results[f"force{way}"] = forces.actuator_force(motion, unknown, rates)
     if isinstance(definition.actuators[unknown], Cylinder | AirSpring):
-        for name, force in list(found.items()):
-            found[name.replace("force", "pressure")] = forces.pressure_for(motion, unknown, force)
+        for name, force in list(results.items()):
+            results[name.replace("force", "pressure")] = forces.pressure_for(motion, unknown, force)
     if definition.output is not None:
         along = motion.point(definition.output.point)[1][:, model.axis]
         with np.errstate(divide="ignore", invalid="ignore"):
-            found["effective_weight"] = -forces.generalised_force(motion) / along
-            found["effective_mass"] = forces.inertia(motion)[0] / along**2
-    return found
+            results["effective_weight"] = -forces.generalised_force(motion) / along
+            results["effective_mass"] = forces.inertia(motion)[0] / along**2
+    return results
 
 
 def _pressure_angle(motion: Motion, name: str, row: int) -> Any:

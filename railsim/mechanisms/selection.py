@@ -117,14 +117,14 @@ def _gas_spring(
         stroke = next((c for c in strokes if c >= compressed * (1.0 - ROUNDING)), None)
         if stroke is None:
             why.append(f"compressed by {compressed * 1e3:.1f} mm, {strokes[-1] * 1e3:g} mm at most")
-    said = [] if stroke is None else [f"stroke {stroke * 1e3:.4g} mm"]
+    notes = [] if stroke is None else [f"stroke {stroke * 1e3:.4g} mm"]
     stated = [n(limit) for limit, _, _ in row.F1_tolerance or ()]
     if stated and max(stated) < F1:
-        said.append(f"no tolerance of F1 stated above {max(stated):g} N")
+        notes.append(f"no tolerance of F1 stated above {max(stated):g} N")
     values: dict[str, float] = {}
     if not why and stroke is not None:
         values = _with_row(result, name, spring, row, stroke, extended)
-    return Choice(catalogue, f"{name}: {row.name}", not why, tuple(why or said), values)
+    return Choice(catalogue, f"{name}: {row.name}", not why, tuple(why or notes), values)
 
 
 def _strokes(result: Analysis, row: CatalogueRow, needed: float) -> list[float]:

@@ -111,9 +111,9 @@ def published_data(result: Analysis) -> dict[str, Data]:
     return {n: {"published": v, "ours": computed[n]} for n, v in printed.items() if n in computed}
 
 
-def _rests(rests: Sequence[Rest], at: str) -> list[Data]:
+def _rests(rests: Sequence[Rest], key: str) -> list[Data]:
     """Positions of rest as plain numbers, the middle of each under a name."""
-    return [{at: r.at, "stable": r.stable, "from": r.low, "to": r.high} for r in rests]
+    return [{key: r.at, "stable": r.stable, "from": r.low, "to": r.high} for r in rests]
 
 
 def _motion_data(result: Analysis, timed: TimedMotion, *, courses: bool) -> Data:
@@ -159,17 +159,17 @@ def optimum_data(optimum: "Optimum") -> Data:
 def data_of(
     results: Sequence[Analysis],
     cases: Mapping[str, Analysis],
-    at: Sequence[list[Data]],
+    values_at: Sequence[list[Data]],
     optimum: "Optimum | None" = None,
 ) -> Data:
     """Some mechanisms with their comparison, or one with its cases, or its optimum.
 
-    `at`: For each mechanism its results where one of them has a value.
+    `values_at`: For each mechanism its results where one of them has a value.
     """
     data = [optimum_data(optimum)] if optimum else [analysis_data(result) for result in results]
-    for one, values in zip(data, at, strict=True):
+    for entry, values in zip(data, values_at, strict=True):
         if values:
-            one["at"] = values
+            entry["at"] = values
     if len(data) > 1:
         return {"mechanisms": data, "comparison": compare(results)}
     others = {name: case for name, case in cases.items() if name != "base"}

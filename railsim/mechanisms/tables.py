@@ -12,7 +12,7 @@ from railsim.design_checks import NEAR_BOUND, check_table, shown, shown_unit
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import compare
-from railsim.mechanisms.contact import Contact, moved
+from railsim.mechanisms.contact import Contact, is_loaded
 from railsim.mechanisms.dynamics import NEAR, driving
 from railsim.mechanisms.kinematics import folded
 from railsim.mechanisms.quantities import force_unit, force_units, quantity
@@ -53,15 +53,15 @@ def position_table(result: Analysis) -> Table:
     return value_table(result, [("start", first), *result.zone.items(), ("end", last)])
 
 
-def value_table(result: Analysis, at: Sequence[tuple[str, Mapping[str, Any]]]) -> Table:
+def value_table(result: Analysis, positions: Sequence[tuple[str, Mapping[str, Any]]]) -> Table:
     """Return a row for each result and a column for each of some positions."""
     definition, rows = result.definition, []
     for name in result.output:
         column = quantity(name, definition)
         unit = f" ({column.unit})" if column.unit else ""
-        values = [folded(v[name]) if name in definition.angles else v[name] for _, v in at]
+        values = [folded(v[name]) if name in definition.angles else v[name] for _, v in positions]
         rows.append([f"{name}{unit}", *(Amount(float(value), column) for value in values)])
-    return Table(["at", *(Column(where, format=">") for where, _ in at)], rows)
+    return Table(["at", *(Column(where, format=">") for where, _ in positions)], rows)
 
 
 def parameter_table(result: Analysis) -> Table:
@@ -140,7 +140,7 @@ def sentences(result: Analysis) -> list[str]:
         if rest.low < rest.high:
             where = f"{driver(rest.low)} to {driver(rest.high)} (friction)"
         found.append(f"at rest at {where}, {'stable' if rest.stable else 'unstable'}")
-    if result.definition.solve is None and moved(result.motion) and not result.rests:
+    if result.definition.solve is None and is_loaded(result.motion) and not result.rests:
         found.append(
             f"no position of rest from {driver(result.model.start)} to {driver(result.model.end)}"
         )
@@ -264,52 +264,52 @@ def optimum_tables(optimum: "Optimum") -> list[Table]:
 
 def parts_of(
     results: Sequence[Analysis],
-    at: Sequence[Sequence[Mapping[str, Any]]],
+    values_at: Sequence[Sequence[Mapping[str, Any]]],
     optimum: "Optimum | None" = None,
 ) -> list[str | Table]:
     """Return sentences and tables on some mechanisms, or on the optimum of one.
 
-    `at`: For each mechanism its results where one of them has a value, ``where`` in words.
+    `values_at`: For each mechanism its results where one of them has a value, ``where`` in words.
     """
     parts: list[str | Table] = []
     if optimum is not None:
         parts += [*optimum_sentences(optimum), ""]
         parts += [part for table in optimum_tables(optimum) for part in (table, "")]
-    for number, (result, values) in enumerate(zip(results, at, strict=True)):
+    for number, (result, values) in enumerate(zip(results, values_at, strict=True)):
         parts += [*[""] * (number > 0), *_result_parts(result, values)]
     return [*parts, "", comparison_table(results)] if len(results) > 1 else parts
 
 
-def _result_parts(result: Analysis, at: Sequence[Mapping[str, Any]]) -> list[str | Table]:
+def _result_parts(result: Analysis, values_at: Sequence[Mapping[str, Any]]) -> list[str | Table]:
     definition = result.definition
     case = f", case {result.case}" if result.case else ""
     parts: list[str | Table] = [f"{definition.name}{case}", "", position_table(result), ""]
-    if at:
-        parts += [value_table(result, [(values["where"], values) for values in at]), ""]
+    if values_at:
+        parts += [value_table(result, [(values["where"], values) for values in values_at]), ""]
     parts += sentences(result)
-    found = (
+    tables = (
         reaction_table(result),
         published_table(result),
         check_table(checks(result)),
         selection_table(selection(result)),
         scatter_table(scatter(definition) if definition.tolerances else []),
     )
-    return parts + [part for table in found if len(table) for part in ("", table)]
+    return parts + [part for table in tables if len(table) for part in ("", table)]
 
 
-def scatter_table(found: Sequence[Scatter]) -> Table:
+def scatter_table(scatters: Sequence[Scatter]) -> Table:
     """Return one row for each result: its scatter and the parameter that matters most."""
     rows = []
-    for one in found:
-        scaled = abs(one.worst) * Column("", unit=shown_unit(one.unit)).scale
+    for result in scatters:
+        scaled = abs(result.worst) * Column("", unit=shown_unit(result.unit)).scale
         before = int(np.floor(np.log10(scaled))) if scaled else 0
         # four digits of the scatter, four decimals at most
         decimals = min(max(3 - before, 0), 4)
-        column = Column("", unit=shown_unit(one.unit), format=f".{decimals}f")
-        most = max(one.single, key=lambda name: abs(one.single[name]))
-        values = [Amount(value, column) for value in (one.value, one.random, one.worst)]
-        change = f"{one.single[most] * column.scale:+{column.format}}"
-        name = f"{one.name} ({column.unit})" if column.unit else one.name
-        rows.append([name, *values, f"{most} ({change})" if one.single[most] else "-"])
+        column = Column("", unit=shown_unit(result.unit), format=f".{decimals}f")
+        most = max(result.single, key=lambda name: abs(result.single[name]))
+        values = [Amount(value, column) for value in (result.value, result.random, result.worst)]
+        change = f"{result.single[most] * column.scale:+{column.format}}"
+        name = f"{result.name} ({column.unit})" if column.unit else result.name
+        rows.append([name, *values, f"{most} ({change})" if result.single[most] else "-"])
     numbers = [Column(name, format=">") for name in ("nominal", "RSS, ±", "worst case, ±")]
     return Table(["result", *numbers, "most by"], rows)
