@@ -154,21 +154,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def _status(given: Sequence[str] | None) -> int:
+def _status(command_line: Sequence[str] | None) -> int:
     """Call a command and return the exit status that its end stands for."""
-    arguments = sys.argv[1:] if given is None else list(given)
-    with interrupts.remembered_interrupts(last=given is None):
+    arguments = sys.argv[1:] if command_line is None else list(command_line)
+    with interrupts.remembered_interrupts(last=command_line is None):
         try:
-            return _called(arguments)
+            return _call(arguments)
         except InputError as error:
             faults = [fault.on_command_line() for fault in error.faults]
             for line in fault_lines(faults):
                 echo(line, err=True)
-            return _failed(arguments, WRONG_INPUT, {"faults": [asdict(fault) for fault in faults]})
+            return _fail(arguments, WRONG_INPUT, {"faults": [asdict(fault) for fault in faults]})
         except RailsimError as error:
             echo(f"railsim: {error}", err=True)
             status = WRONG_INPUT if isinstance(error, ModelError) else FAILED
-            return _failed(arguments, status, {"error": str(error)})
+            return _fail(arguments, status, {"error": str(error)})
         except (KeyboardInterrupt, click.Abort) as interrupt:
             request = interrupt if isinstance(interrupt, Interrupted) else Interrupted()
             remove_partial_files()  # of one just created no block has taken care yet
@@ -186,14 +186,14 @@ def _status(given: Sequence[str] | None) -> int:
             return FAILED
 
 
-def _failed(arguments: Sequence[str], status: int, words: dict[str, Any]) -> int:
+def _fail(arguments: Sequence[str], status: int, record: dict[str, Any]) -> int:
     """Print the error, as JSON if requested; return the status."""
     if "--json" in arguments:
-        print_json({"exit_status": status, **words})
+        print_json({"exit_status": status, **record})
     return status
 
 
-def _called(arguments: list[str]) -> int:
+def _call(arguments: list[str]) -> int:
     """Call a command; if it fails after a lost interrupt, the interrupt is the reason."""
     try:
         with railsim.make_context("railsim", arguments) as context:
@@ -205,7 +205,7 @@ def _called(arguments: list[str]) -> int:
         if where is not None:
             echo(where.get_usage(), err=True)
         echo(f"railsim: {error.format_message()}", err=True)
-        status = _failed(arguments, WRONG_INPUT, {"error": error.format_message()})
+        status = _fail(arguments, WRONG_INPUT, {"error": error.format_message()})
     except Exception:
         interrupts.raise_pending_signal()
         raise

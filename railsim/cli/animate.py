@@ -53,7 +53,7 @@ def _scene(
         from railsim.result import open_run
 
         allowed = "give the JSON of railsim modes"
-        cli.refused("belongs to a mode", allowed, "vehicle", "mode").check()
+        cli.refusals("belongs to a mode", allowed, "vehicle", "mode").check()
         frames = frames or (FILM_FRAMES if film else FRAMES)
         return result_scene(open_run(file), frames=frames, between=between)
     from railsim.definitions.loading import load_vehicle

@@ -41,8 +41,8 @@ def option(
 
 def choice(names: str, words: str, values: str, **more: Any) -> Callable[[F], F]:
     """Return an option with one of several values, ``one|another``; by default the first."""
-    known = values.split("|")
-    return option(names, words, kind=click.Choice(known), **{"default": known[0]} | more)
+    allowed = values.split("|")
+    return option(names, words, kind=click.Choice(allowed), **{"default": allowed[0]} | more)
 
 
 def repeated(names: str, words: str, metavar: str, *kind: Any, **more: Any) -> Callable[[F], F]:
@@ -53,10 +53,10 @@ def repeated(names: str, words: str, metavar: str, *kind: Any, **more: Any) -> C
 def values(names: str, words: str, metavar: str, **more: Any) -> Callable[[F], F]:
     """Return an option with several values, see `values_of`."""
 
-    def parsed(ctx: Any, param: click.Parameter, text: str | None) -> list[float] | None:
+    def parse(ctx: Any, param: click.Parameter, text: str | None) -> list[float] | None:
         return values_of(text, param.opts[0]) if text is not None else None
 
-    return option(names, words, metavar, callback=parsed, **more)
+    return option(names, words, metavar, callback=parse, **more)
 
 
 def flag(name: str, words: str, **more: Any) -> Callable[[F], F]:
@@ -64,36 +64,36 @@ def flag(name: str, words: str, **more: Any) -> Callable[[F], F]:
     return click.option(*name.split(), is_flag=True, help=words, **more)
 
 
-def _given(names: Sequence[str]) -> list[str]:
+def _given_options(names: Sequence[str]) -> list[str]:
     """Return those of some parameters that the command line gives, as it calls them."""
     context = click.get_current_context()
     return [
-        one.opts[0] if isinstance(one, click.Option) else str(one.metavar).strip("[]")
-        for one in context.command.params
-        if one.name in names
-        and context.get_parameter_source(one.name) is ParameterSource.COMMANDLINE
+        param.opts[0] if isinstance(param, click.Option) else str(param.metavar).strip("[]")
+        for param in context.command.params
+        if param.name in names
+        and context.get_parameter_source(param.name) is ParameterSource.COMMANDLINE
     ]
 
 
-def refused(found: str, allowed: str, *names: str) -> Faults:
+def refusals(found: str, allowed: str, *names: str) -> Faults:
     """Return a fault for each of some parameters that the command line gives."""
-    return Faults(Fault(option, "", found, allowed) for option in _given(names))
+    return Faults(Fault(option, "", found, allowed) for option in _given_options(names))
 
 
-def goes_with(partner: str, met: object, *names: str) -> None:
+def goes_with(partner: str, present: object, *names: str) -> None:
     """Refuse parameters that the command line gives without their partner: they do nothing."""
-    given = _given(names)
-    if given and not met:
-        verb = "goes" if len(given) == 1 else "go"
-        raise click.UsageError(f"{' and '.join(given)} {verb} with {partner}")
+    options = _given_options(names)
+    if options and not present:
+        verb = "goes" if len(options) == 1 else "go"
+        raise click.UsageError(f"{' and '.join(options)} {verb} with {partner}")
 
 
 def together(*options: Callable[[Any], Any]) -> Callable[[F], F]:
     """Return several options as one decorator, in this order."""
 
     def add(function: Any) -> Any:
-        for one in reversed(options):
-            function = one(function)
+        for each in reversed(options):
+            function = each(function)
         return function
 
     return add
@@ -137,21 +137,21 @@ def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["
     from railsim.definitions import Track, Vehicle
     from railsim.definitions.base import Remark
 
-    found = definition.unusual()
+    notes = definition.unusual()
     if isinstance(definition, Vehicle):
         from railsim.model.plausibility import vehicle_remarks
 
-        found = [*found, *vehicle_remarks(definition, supports=supports)]
+        notes = [*notes, *vehicle_remarks(definition, supports=supports)]
     if isinstance(definition, Track):
         from railsim.track.irregularity import measured_remarks
 
-        found = [*found, *(Remark("irregularities", text) for text in measured_remarks(definition))]
+        notes = [*notes, *(Remark("irregularities", text) for text in measured_remarks(definition))]
     if isinstance(definition, Vehicle | Track):
         from railsim.laws.permission import refused
 
         left_out = "not executed here: left out of pictures and of the vehicle at rest"
-        found = [*found, *(Remark(f"laws.{name}", left_out) for name in refused(definition))]
-    return found
+        notes = [*notes, *(Remark(f"laws.{name}", left_out) for name in refused(definition))]
+    return notes
 
 
 json_option = flag("--json as_json", "Machine-readable results on stdout.")
@@ -193,7 +193,7 @@ _law_option = repeated("--law", "Execute the laws of this file or name.", "FILE"
 code_options = together(allow_code_option, _law_option)
 
 
-def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F], F]:
+def options_as_object(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F], F]:
     """Return what adds options to a command, which takes their values as one object.
 
     `name`: parameter of the command; `kind`: dataclass of the object, with the options' parameters
@@ -205,14 +205,14 @@ def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F]
         @wraps(function)
         def command(**values: Any) -> Any:
             load = values.get("load")
-            own = {key: values.pop(key) for key in keys if key in values}
+            option_values = {key: values.pop(key) for key in keys if key in values}
 
-            def told(fault: Fault) -> Fault:  # --load stands for an assignment
+            def as_load_option(fault: Fault) -> Fault:  # --load stands for an assignment
                 of_load = fault.option == "--set" and fault.key in ("load", "vehicle.load")
                 return replace(fault, key="", option="--load") if load and of_load else fault
 
-            with changed_faults(told):
-                return function(**values, **{name: kind(**own)})
+            with changed_faults(as_load_option):
+                return function(**values, **{name: kind(**option_values)})
 
         return together(*options)(command)  # type: ignore[return-value]
 
@@ -233,13 +233,13 @@ def faults_in(file: str, kind: str, name: str) -> AbstractContextManager[None]:
     bear.
     """
 
-    def located(fault: Fault) -> Fault:
+    def locate(fault: Fault) -> Fault:
         if fault.file not in ("", name):
             return fault
         source = read_source(find_file(file, kind), kind)
         return source.fault(fault.key, fault.found, fault.allowed)
 
-    return changed_faults(located)
+    return changed_faults(locate)
 
 
 MOST_VALUES = 2000
@@ -309,7 +309,7 @@ def given_options(settings: str = "", *, load: bool = True) -> Callable[[F], F]:
     """
     words = f"Settings file: {settings}." if settings else "Settings file."
     options: list[Any] = [option("--settings", words, "F"), set_option]
-    return collected("given", Given, *[load_option] * load, *options)
+    return options_as_object("given", Given, *[load_option] * load, *options)
 
 
 def values_of(text: str, option: str) -> list[float]:
@@ -403,13 +403,13 @@ class Output:
             echo(path)
 
     def finish(
-        self, names: Any, found: Any, parts: Any, remarks: Iterable[object] = (), **more: Any
+        self, names: Any, result: Any, parts: Any, remarks: Iterable[object] = (), **more: Any
     ) -> None:
         """Write record, with `more`, and plot of a result under two names, and answer with them."""
-        record = found.record()
-        for one in record if isinstance(record, list) else [record]:
-            one |= more
-        self.write_all({names[0]: record, names[1]: found.plot})
+        record = result.record()
+        for entry in record if isinstance(record, list) else [record]:
+            entry |= more
+        self.write_all({names[0]: record, names[1]: result.plot})
         self.answer(record, parts, remarks)
 
     def progress(self, words: str) -> AbstractContextManager[Callable[[float], None]]:
@@ -456,8 +456,8 @@ def output_options(out: str = "") -> Callable[[F], F]:
     The command takes them as `output`.
     """
     folder = [option("--out", out, "DIR")] if out else []
-    return collected("output", Output, *folder, overwrite_option, json_option, quiet_option)
+    return options_as_object("output", Output, *folder, overwrite_option, json_option, quiet_option)
 
 
-answer_options = collected("output", Output, json_option, quiet_option)
+answer_options = options_as_object("output", Output, json_option, quiet_option)
 """Adds ``--json`` and ``--quiet``; the command takes them as `output`."""

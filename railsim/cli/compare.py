@@ -57,7 +57,7 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
 
     cli.goes_with("--out", output.folder, "over")
     groups = _groups(files, output)
-    output.reserve(*(_named(name, title) for title in groups for name in FILES))
+    output.reserve(*(_file_name(name, title) for title in groups for name in FILES))
     tracks = [result.track() for results in groups.values() for result in results.values()]
     random = any(one.type == "random" for track in tracks for one in track.irregularities)
     if random and not output.quiet:
@@ -78,7 +78,7 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
             "along_the_track": [one.record() for one in differing],
         }
         records.append({"group": title, **record} if title else record)
-        table, data, picture, differences = (_named(name, title) for name in FILES)
+        table, data, picture, differences = (_file_name(name, title) for name in FILES)
         output.write(table, comparison_table(rows))
         output.write(data, record)
         output.write(picture, lambda group=results: overlay(group, over=over))
@@ -101,7 +101,7 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
     output.answer(records[0] if list(groups) == [""] else {"groups": records}, parts)
 
 
-def _named(name: str, title: str) -> str:
+def _file_name(name: str, title: str) -> str:
     from railsim.studies.rows import in_a_name
 
     stem, _, ending = name.partition(".")

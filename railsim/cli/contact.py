@@ -106,31 +106,31 @@ def command(
     cli.goes_with("--build-creep-table", False, "workers")
     for kind, _ in zip(("wheel", "rail"), profiles, strict=False):
         cli.goes_with(f"no {kind.upper()}", False, kind)
-    compared = load_profile(overlay) if overlay else None
-    further = CREEP * creep + MAP * bool(gauges) + (OVERLAY,) * bool(compared)
+    other = load_profile(overlay) if overlay else None
+    further = CREEP * creep + MAP * bool(gauges) + (OVERLAY,) * bool(other)
     output.reserve(*PICTURES, *TABLES, *further)
     numbers["radii"] = radii[0], radii[-1]
     with output.progress("contact"):
-        found = contact_summary(_profiles(wheel, "wheel"), _profiles(rail, "rail"), **numbers)
-    described = _described(found)
+        summary = contact_summary(_profiles(wheel, "wheel"), _profiles(rail, "rail"), **numbers)
+    description = _description(summary)
     by_gauge = None
     if gauges:
-        by_gauge = conicity_over_gauge(found, gauges)
-        described.data.update(gauges=gauges, conicity_over_gauge=by_gauge.tolist())
-        described.parts.extend(["", tables.conicity_map_table(found, gauges, by_gauge)])
+        by_gauge = conicity_over_gauge(summary, gauges)
+        description.data.update(gauges=gauges, conicity_over_gauge=by_gauge.tolist())
+        description.parts.extend(["", tables.conicity_map_table(summary, gauges, by_gauge)])
     if output.folder:
-        _write(output, found, gauges, by_gauge, compared)
+        _write(output, summary, gauges, by_gauge, other)
     if creep:
-        patch = found.main_patch(friction)
+        patch = summary.main_patch(friction)
         rows = forces_by_law(patch)
-        described.data.update(creep=rows)
-        described.parts.extend(["", tables.creep_table(patch, rows)])
+        description.data.update(creep=rows)
+        description.parts.extend(["", tables.creep_table(patch, rows)])
         if output.folder:
             _write_creep(output, patch, rows)
     if not (output.as_json or output.quiet):
-        for note in found.notes:
+        for note in summary.notes:
             echo(note, err=True)
-    output.answer(described.data, described.parts)
+    output.answer(description.data, description.parts)
 
 
 def _check(
@@ -158,7 +158,7 @@ def _profiles(names: Sequence[str], kind: Any) -> tuple[Any, Any]:
     return loaded[names[0]], loaded[names[-1]]
 
 
-def _described(found: "ContactSummary") -> "Description":
+def _description(summary: "ContactSummary") -> "Description":
     """Return what is printed, and everything for ``--json``, SI."""
     from railsim.assessment.criteria import steering_index
     from railsim.assessment.influences import RADIUS
@@ -166,26 +166,26 @@ def _described(found: "ContactSummary") -> "Description":
     from railsim.contact.gauges import gauge_table
     from railsim.description import Description
 
-    left, right = found.pairs
-    wheels, diameter = (left.wheel, right.wheel), 2.0 * min(found.radii)
+    left, right = summary.pairs
+    wheels, diameter = (left.wheel, right.wheel), 2.0 * min(summary.radii)
     between = {"back_to_back": left.back_to_back, "gauge": left.gauge}
     gauge_values = gauge_table(wheels, diameter=diameter, **between)
-    steering = steering_index(found.geometry, RADIUS, min(found.radii))
-    data: dict[str, Any] = {name: values.tolist() for name, values in found.functions.items()}
-    conicities = zip(map(float, found.amplitudes), map(float, found.conicity), strict=True)
+    steering = steering_index(summary.geometry, RADIUS, min(summary.radii))
+    data: dict[str, Any] = {name: values.tolist() for name, values in summary.functions.items()}
+    conicities = zip(map(float, summary.amplitudes), map(float, summary.conicity), strict=True)
     data["equivalent_conicity"] = [{"amplitude": a, "value": v} for a, v in conicities]
-    data["jumps"] = [{"lateral": lateral, "side": side} for lateral, side in found.geometry.jumps()]
-    data |= {"patches": found.patches, "notes": found.notes}
+    data["jumps"] = [{"lateral": y, "side": side} for y, side in summary.geometry.jumps()]
+    data |= {"patches": summary.patches, "notes": summary.notes}
     data["gauge_values"] = gauge_values.records()
     data["steering_index"] = {"radius": RADIUS, "value": steering}
     words = f"steering index at R {RADIUS:g} m: {steering:.2f}; above 1 the flange steers too"
-    functions, conicity = tables.printed_functions(found), tables.printed_conicity(found)
-    patches = tables.patch_table(found)
+    functions, conicity = tables.printed_functions(summary), tables.printed_conicity(summary)
+    patches = tables.patch_table(summary)
     return Description(data, [functions, "", conicity, "", gauge_values, words, "", patches])
 
 
 def _write(
-    output: cli.Output, found: "ContactSummary", gauges: Any, by_gauge: Any, compared: Any
+    output: cli.Output, summary: "ContactSummary", gauges: Any, by_gauge: Any, profile: Any
 ) -> None:
     """Write the tables and the pictures that there always are, over the gauge, of a profile."""
     from railsim.contact import tables
@@ -193,28 +193,29 @@ def _write(
     from railsim.plot import contact as plot
     from railsim.text import unformatted
 
-    _, right = found.pairs
-    names = " / ".join(dict.fromkeys(pair.words for pair in found.pairs))
+    _, right = summary.pairs
+    names = " / ".join(dict.fromkeys(pair.words for pair in summary.pairs))
     title, gauge = unformatted(names), f", gauge {1e3 * right.gauge:g} mm"
-    other = found.with_other_normal() if found.exact else None
-    labels = (f"table, {found.normal}", f"table, {OTHER_NORMAL[found.normal]}")
+    contacts, load, exact = summary.contacts, summary.load, summary.exact
+    other = summary.with_other_normal() if exact else None
+    labels = (f"table, {summary.normal}", f"table, {OTHER_NORMAL[summary.normal]}")
     content = (
-        tables.function_table(found),
-        tables.conicity_table(found),
-        tables.patch_table(found),
-        plot.profiles_figure(found.geometry, found.pairs),
-        plot.functions_figure(found.geometry, title + gauge),
-        plot.conicity_figure({names + gauge: (found.amplitudes, found.conicity)}),
-        plot.patches_figure(found.contacts, found.load, found.exact, other, labels, f", {title}"),
+        tables.function_table(summary),
+        tables.conicity_table(summary),
+        tables.patch_table(summary),
+        plot.profiles_figure(summary.geometry, summary.pairs),
+        plot.functions_figure(summary.geometry, title + gauge),
+        plot.conicity_figure({names + gauge: (summary.amplitudes, summary.conicity)}),
+        plot.patches_figure(contacts, load, exact, other, labels, f", {title}"),
     )
-    for name, one in zip((*TABLES, *PICTURES), content, strict=True):
-        output.write(name, one)
+    for name, part in zip((*TABLES, *PICTURES), content, strict=True):
+        output.write(name, part)
     if gauges:
-        output.write(MAP[0], plot.conicity_map_figure(gauges, found.amplitudes, by_gauge, title))
-        output.write(MAP[1], tables.conicity_map_table(found, gauges, by_gauge))
-    if compared:
-        own = right.wheel if compared.kind == "wheel" else right.rail
-        output.write(OVERLAY, plot.overlay_figure([compared, own]))
+        output.write(MAP[0], plot.conicity_map_figure(gauges, summary.amplitudes, by_gauge, title))
+        output.write(MAP[1], tables.conicity_map_table(summary, gauges, by_gauge))
+    if profile:
+        of_pair = right.wheel if profile.kind == "wheel" else right.rail
+        output.write(OVERLAY, plot.overlay_figure([profile, of_pair]))
 
 
 def _write_creep(output: cli.Output, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:

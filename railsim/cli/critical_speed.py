@@ -58,8 +58,8 @@ def command(
     """
     workers = how.pop("workers")
     cli.goes_with("--method bifurcation or all", method in ("bifurcation", "all"), "points")
-    tried = method not in ("linear", "continuation")
-    cli.goes_with("--method ramp, bifurcation or all", tried, "excitations")
+    with_excitation = method not in ("linear", "continuation")
+    cli.goes_with("--method ramp, bifurcation or all", with_excitation, "excitations")
     cli.goes_with("--linearisation harmonic", how["linearisation"] == "harmonic", "amplitude")
     output.reserve(*FILES)
     inputs, ranges = given.inputs(), _ranges(conicity, friction, over)
@@ -67,16 +67,16 @@ def command(
     if how["excitations"] is None:
         del how["excitations"]
     each = (dict(zip(ranges, values, strict=True)) for values in product(*ranges.values()))
-    points = [_point(inputs, given, at) for at in each]
+    points = [_point(inputs, given, point) for point in each]
     if len(points) > 1:
         _map(points, ranges, how, workers, output)
         return
     from railsim.stability.critical_speed import critical_speed
 
-    at = points[0]
+    point = points[0]
     with output.progress("critical speed") as progress:
-        how |= {"settings": at.settings, "conicity": at.at.get("conicity")}
-        found = critical_speed(at.vehicle, at.track, progress=progress, **how)
+        how |= {"settings": point.settings, "conicity": point.values.get("conicity")}
+        found = critical_speed(point.vehicle, point.track, progress=progress, **how)
     output.finish(FILES, found, [found.table(), *filter(None, [found.verdict()])], found.remarks)
 
 
@@ -93,46 +93,46 @@ def _map(
 
     how["over_amplitude"] = False
     with output.studying("critical speed") as studying:
-        found = stability_map(points, how, folder=output.folder, workers=workers, **studying)
+        records = stability_map(points, how, folder=output.folder, workers=workers, **studying)
     axes = {name: values for name, values in ranges.items() if len(values) > 1}
     units = {name: unit_of_input(points[0], name) for name in axes}
-    shown = {f"{name} ({units[name]})" if units[name] else name: axes[name] for name in axes}
-    table = map_table(found, units)
+    parameters = {f"{name} ({units[name]})" if units[name] else name: axes[name] for name in axes}
+    table = map_table(records, units)
     title = f"{points[0].vehicle.name_with_load}: critical speed\n{table.caption}"
-    figure = partial(map_figure, shown, map_speeds(found), title)
-    output.write_all({FILES[0]: found, FILES[1]: figure})
-    remarks = dict.fromkeys(remark for record in found for remark in record["remarks"])
-    output.answer(found, [table], remarks)
+    figure = partial(map_figure, parameters, map_speeds(records), title)
+    output.write_all({FILES[0]: records, FILES[1]: figure})
+    remarks = dict.fromkeys(remark for record in records for remark in record["remarks"])
+    output.answer(records, [table], remarks)
 
 
 def _ranges(
     conicity: list[float] | None, friction: list[float] | None, over: tuple[str, ...]
 ) -> dict[str, list[float]]:
     """Values by parameter; of a map two parameters at most."""
-    found = {"conicity": conicity or [], "friction": friction or []}
-    found = {name: values for name, values in found.items() if values}
-    for mu in found.get("friction", ()):  # 0,4 is two values
+    ranges = {"conicity": conicity or [], "friction": friction or []}
+    ranges = {name: values for name, values in ranges.items() if values}
+    for mu in ranges.get("friction", ()):  # 0,4 is two values
         if not 0.0 <= mu <= 2.0:
             raise input_error("--friction", f"found {mu:.12g}", "0 to 2, such as 0.4")
     for text in over:
         key, equals, values = text.partition("=")
         if not equals:
             raise input_error("--over", f"found '{text}'", "KEY.PATH=first:last:number")
-        if key in found or (key.startswith("track.friction") and "friction" in found):
+        if key in ranges or (key.startswith("track.friction") and "friction" in ranges):
             raise input_error("--over", "given twice", "each key once, or by its option", key=key)
-        found[key] = cli.values_of(values, "--over")
-    several = [name for name, values in found.items() if len(values) > 1]
+        ranges[key] = cli.values_of(values, "--over")
+    several = [name for name, values in ranges.items() if len(values) > 1]
     if len(several) > 2:
         words = f"found {len(several)} parameters with several values ({', '.join(several)})"
         raise input_error("--over", words, "two at most")
-    return found
+    return ranges
 
 
-def _point(inputs: cli.Inputs, given: cli.Given, at: dict[str, float]) -> "MapPoint":
+def _point(inputs: cli.Inputs, given: cli.Given, values: dict[str, float]) -> "MapPoint":
     from railsim.studies.stability_map import MapPoint
 
-    changes = [f"{key}={value!r}" for key, value in at.items() if key not in BY_OPTION]
+    changes = [f"{key}={value!r}" for key, value in values.items() if key not in BY_OPTION]
     vehicle, track, settings = given.inputs(changes) if changes else inputs
-    if "friction" in at:
-        track = track.replace(friction=at["friction"], friction_table=None)
-    return MapPoint(at, vehicle, track, settings)
+    if "friction" in values:
+        track = track.replace(friction=values["friction"], friction_table=None)
+    return MapPoint(values, vehicle, track, settings)

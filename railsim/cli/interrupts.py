@@ -98,10 +98,10 @@ def _listening(numbers: set[int]) -> Callable[[], None]:
     return end
 
 
-def _listen(reader: int, numbers: set[int], ended: threading.Event) -> None:
+def _listen(reader: int, numbers: set[int], end: threading.Event) -> None:
     while heard := os.read(reader, 1):
         if heard[0] in numbers:
-            if not ended.wait(PATIENCE):
+            if not end.wait(PATIENCE):
                 _end_now(heard[0])
             return
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 REPORT, OPTIMISED = "report.html", "optimised.toml"
 
-Wanted = tuple[str, str, float]  # words of --at: name of a result, its value
+Query = tuple[str, str, float]  # words of --at: name of a result, its value
 
 
 @click.command()
@@ -69,20 +69,20 @@ def command(
 
         others = (f"drawing_{number}.png" for number in range(2, len(files) + 1))
         output.reserve(*NAMES, *others, *[OPTIMISED] * searched)
-    wanted = _wanted(at)
+    queries = _queries(at)
     optimum, results, at_values, cases = None, [], [], {}
     for file, mechanism in zip(files, mechanisms, strict=True):
         with cli.faults_in(file, "mechanism", mechanism.name):
             if searched:
                 chosen, cores = mechanism.in_case(case), available_cores()
-                if wanted:  # before the search
+                if queries:  # before the search
                     before = analyse(chosen)
-                    for _, name, _ in wanted:
+                    for _, name, _ in queries:
                         before.result(name)
                 optimum = optimise(chosen, workers=cores, **search)
             results.append(optimum.after if optimum else analyse(mechanism, case))
-            found = ((words, results[-1].everywhere(name, value)) for words, name, value in wanted)
-            at_values.append([{"where": words, **one} for words, rows in found for one in rows])
+            hits = ((words, results[-1].everywhere(name, value)) for words, name, value in queries)
+            at_values.append([{"where": words, **one} for words, rows in hits for one in rows])
             if len(results) == 1 and mechanism.cases and case is None and not searched:
                 cases = {name: _of_case(mechanism, name) for name in mechanism.cases}
                 cases = {"base": results[0], **cases}
@@ -110,10 +110,10 @@ def _of_case(mechanism: "Mechanism", case: str) -> "Analysis":
         return analyse(mechanism, case)
 
 
-def _wanted(at: Sequence[str]) -> list[Wanted]:
+def _queries(assignments: Sequence[str]) -> list[Query]:
     """Words of --at, with the name of the result and its value."""
-    found = list[Wanted]()
-    for assignment in at:
+    queries = list[Query]()
+    for assignment in assignments:
         name, equals, written = assignment.partition("=")
         try:
             value = float(written)
@@ -121,5 +121,5 @@ def _wanted(at: Sequence[str]) -> list[Wanted]:
             equals = ""
         if not equals:
             raise input_error("--at", f"'{assignment}'", "NAME=VALUE, in SI units")
-        found.append((assignment, name.strip(), value))
-    return found
+        queries.append((assignment, name.strip(), value))
+    return queries

@@ -80,21 +80,21 @@ def command(
         else:
             found = modes(coach, rails, settings=settings, speed=speed, **how)
     if folder is not None and isinstance(found, Modes):
-        output.written += _animated(coach, found, animate, folder / page)
+        output.written += _animate(coach, found, animate, folder / page)
     output.finish(FILES, found, [found.table(), *found.notes], found.remarks, vehicle=given.vehicle)
 
 
-def _animated(vehicle: "Vehicle", found: "Modes", name: str | None, page: Path) -> list[Path]:
+def _animate(vehicle: "Vehicle", modes: "Modes", name: str | None, page: Path) -> list[Path]:
     """Write the oscillations as a page that shows one of them; nothing where there is none."""
     from railsim.animation import mode_scene, write_page
     from railsim.animation.scene import chosen_mode
     from railsim.linear.modes import SHOWN
 
-    records = [m.record() for m in found.oscillations if m.natural_frequency <= SHOWN]
-    first = found.least_damped.name if found.least_damped else ""
+    records = [m.record() for m in modes.oscillations if m.natural_frequency <= SHOWN]
+    first = modes.least_damped.name if modes.least_damped else ""
     scenes = {}
     if name is not None:
-        chosen = chosen_mode(found.record()["modes"], name, "--animate")
+        chosen = chosen_mode(modes.record()["modes"], name, "--animate")
         first = str(chosen["name"])
         scenes[first] = mode_scene(vehicle, chosen, **CYCLE)
     for record in records:
@@ -119,11 +119,11 @@ def _over(given: cli.Given, over: str, speed: float, how: dict[str, Any]) -> "Ro
     def inputs(value: float) -> cli.Inputs:
         return given.inputs([f"{key}={value!r}"])
 
-    def prepared(value: float) -> LinearVehicle:
+    def linear_vehicle(value: float) -> LinearVehicle:
         coach, rails, settings = inputs(value)
         return LinearVehicle(coach, rails, contact=contact, settings=smooth_law(settings), **how)
 
     values = cli.values_of(text, "--over")
     for value in values:  # all are looked at before the first is computed
         inputs(value)
-    return parameter_locus(prepared, key, values, speed, unit_of_input(given.inputs(), key))
+    return parameter_locus(linear_vehicle, key, values, speed, unit_of_input(given.inputs(), key))

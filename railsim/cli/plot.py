@@ -78,7 +78,7 @@ def command(
     path = output.file(default, PICTURES, suffix=f"_{RECORDING}.png" if recording else ".png")
     if not of_study:
         found = f"'{file}' is no study's folder"
-        cli.refused(found, "a folder of results", "against", "family", "kind").check()
+        cli.refusals(found, "a folder of results", "against", "family", "kind").check()
     if of_study:
         figure = _study_figure(str(folder), selections, against, family, kind)
     elif result:
@@ -145,7 +145,7 @@ def _study_figure(
             raise input_error("--kind", found, "a study over two parameters", key="map")
         figure = map_figure(quantities, varied[x], varied[members[0]])
     else:
-        figure = curves_figure(quantities, varied[x], _joined([varied[m] for m in members]), early)
+        figure = curves_figure(quantities, varied[x], _combine([varied[m] for m in members]), early)
     mixed = [name for name in rest if name not in members]
     if mixed and kind != "ranking":
         say_above(figure, f"Not told apart: {', '.join(mixed)} (options: --against, --family)")
@@ -153,11 +153,11 @@ def _study_figure(
         crosses = " (crosses)" if kind == "curves" else ""
         runs = f"{sum(early)} of {len(records)} runs ended early{crosses}"
         say_above(figure, f"{runs}: their values until then")
-    say_above(figure, _same(folder_of(file).resolve().name, records, varied))
+    say_above(figure, _common_title(folder_of(file).resolve().name, records, varied))
     return figure
 
 
-def _joined(columns: "Sequence[Column]") -> "Column | None":
+def _combine(columns: "Sequence[Column]") -> "Column | None":
     """Several parameters as one; None for none."""
     from railsim.plot.study import Column
 
@@ -167,11 +167,11 @@ def _joined(columns: "Sequence[Column]") -> "Column | None":
     return Column(", ".join(c.words for c in columns), [", ".join(map(str, v)) for v in values])
 
 
-def _same(name: str, records: Sequence[Mapping[str, Any]], varied: Collection[str]) -> str:
+def _common_title(name: str, records: Sequence[Mapping[str, Any]], keys: Collection[str]) -> str:
     """What a study is called, and what all its runs have."""
     labels = records[0]["labels"]
-    told = [labels[kind] for kind in ("vehicle", "track", "speed") if kind in {*labels} - {*varied}]
-    words = [f"{value:g} m/s" if isinstance(value, float) else str(value) for value in told]
+    common = [labels[kind] for kind in ("vehicle", "track", "speed") if kind in {*labels} - {*keys}]
+    words = [f"{value:g} m/s" if isinstance(value, float) else str(value) for value in common]
     return unformatted(": ".join(filter(None, [name, ", ".join(words)])))
 
 

@@ -44,9 +44,9 @@ def _cause() -> str:
     return COMPILING if execute is not None and not execute.is_compiled() else ""
 
 
-def _report_causes(ended: Event) -> None:
+def _report_causes(end: Event) -> None:
     """Report every cause once in a process, until the work has ended."""
-    while not ended.wait(PATIENCE):
+    while not end.wait(PATIENCE):
         words = _cause()
         if words and words not in _reported:
             _reported.add(words)

@@ -57,13 +57,13 @@ def command(
     from railsim.studies.case import of_settings, run_case
 
     keep_freed_memory()
-    resume = _opened(before) if before else None
+    resume = _open_for_continuation(before) if before else None
     if resume:
         *_, start, speed = map(float, resume.groups["state"]["end"])
         extent["start"] = start
     extent["start"] = extent["start"] or 0.0
     spec = given.run(speed, **extent)
-    case, path = _checked(spec, output, plots)
+    case, path = _load_case(spec, output, plots)
     quiet, overwrite = output.quiet, output.overwrite
     if not (quiet or output.as_json):
         show(*assumptions(case.vehicle, case.track, case.settings, case.speed))
@@ -95,11 +95,11 @@ def command(
     return cli.DONE if result.status == "complete" else cli.ENDED_EARLY
 
 
-def _opened(before: str) -> "Result":
+def _open_for_continuation(before: str) -> "Result":
     """Open a result to go on from, which gives speed and position itself."""
     from railsim.result import open_run
 
-    faults = cli.refused("given together with --continue", "one of the two", "speed", "start")
+    faults = cli.refusals("given together with --continue", "one of the two", "speed", "start")
     with faults.caught():
         result = open_run(before)
         if "end" not in result.groups.get("state", {}):
@@ -108,7 +108,7 @@ def _opened(before: str) -> "Result":
     return result
 
 
-def _checked(spec: "RunSpec", output: cli.Output, plots: bool) -> "tuple[Case, Path]":
+def _load_case(spec: "RunSpec", output: cli.Output, plots: bool) -> "tuple[Case, Path]":
     """Load the case and settle its file; everything that is wrong with either at once."""
     from railsim.studies.case import load_case
 

@@ -50,7 +50,7 @@ def _spring_command(function: Callable[..., Answer]) -> Callable[..., None]:
     """
 
     @wraps(function)
-    def called(file: str, assignments: Sequence[str], output: cli.Output, **how: Any) -> None:
+    def command(file: str, assignments: Sequence[str], output: cli.Output, **how: Any) -> None:
         from railsim.definitions.loading import load_spring
 
         if output.folder:
@@ -59,12 +59,12 @@ def _spring_command(function: Callable[..., Answer]) -> Callable[..., None]:
             output.reserve(*NAMES)
         suspension = load_spring(file, assignments)
         with cli.faults_in(file, "spring", suspension.name):
-            data, parts, found = function(suspension, **how)
+            data, parts, search = function(suspension, **how)
             if output.folder:
-                output.write_all(files(suspension, found))
+                output.write_all(files(suspension, search))
         output.answer(data, parts, suspension.unusual())
 
-    return cast("Callable[..., None]", _options(called))
+    return cast("Callable[..., None]", _options(command))
 
 
 @_spring_command

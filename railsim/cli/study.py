@@ -194,7 +194,7 @@ def _campaign(
     from railsim.studies.campaign import campaign
 
     found, allowed = "given together with --scenario", "the scenario's file holds it"
-    faults = cli.refused(found, allowed, *OF_SCENARIO)
+    faults = cli.refusals(found, allowed, *OF_SCENARIO)
     if not vehicles:
         faults.append(Fault("--vehicles", "", "not given", "give one vehicle at least"))
     faults.check()
@@ -202,21 +202,21 @@ def _campaign(
     how["on_record"] = None if output.quiet or output.as_json else lines
     how["further_files"] = *FILES, *("report.html",) * report
     with output.studying(scenario) as studying:
-        done = campaign(scenario, list(vehicles), out=str(output.out), **studying, **how)
-    write_assessments(output, done.assessments)
+        outcome = campaign(scenario, list(vehicles), out=str(output.out), **studying, **how)
+    write_assessments(output, outcome.assessments)
     if report:
         from railsim.cli.report import write_report
 
-        page = Path(done.folder, "report.html")
-        write_report([str(done.folder)], page, assessments=done.assessments)
+        page = Path(outcome.folder, "report.html")
+        write_report([str(outcome.folder)], page, assessments=outcome.assessments)
         output.written.append(page)
     if not output.as_json:
         lines.end(remarks=False)  # the assessments repeat them
-        for assessment in done.assessments:
+        for assessment in outcome.assessments:
             show("", *assessment_lines(assessment, quiet=output.quiet))
-    records = [assessment.record() for assessment in done.assessments]
-    output.answer({"folder": str(done.folder), "assessments": records})
-    ended = any(result.status != "complete" for result in done.results.values())
+    records = [assessment.record() for assessment in outcome.assessments]
+    output.answer({"folder": str(outcome.folder), "assessments": records})
+    ended = any(result.status != "complete" for result in outcome.results.values())
     return cli.ENDED_EARLY if ended else cli.DONE
 
 
@@ -224,7 +224,7 @@ def _spec(
     file: str | None,
     inputs: dict[str, Any],
     quantities: str | None,
-    kept: dict[str, Any],
+    storage: dict[str, Any],
     output: cli.Output,
 ) -> "StudySpec":
     """Return the study of the options, or of a file with the assignments of the options."""
@@ -237,11 +237,11 @@ def _spec(
         words = "not given", "give one value at least"
         Faults(Fault(f"--{name}", "", *words) for name in missing).check()
         named = {"quantities": full_name(quantities)}
-        return validated(StudySpec, {**kept, **inputs, **named}, "study")
-    cli.refused("given together with a study file", "the file holds it", *OF_FILE).check()
+        return validated(StudySpec, {**storage, **inputs, **named}, "study")
+    cli.refusals("given together with a study file", "the file holds it", *OF_FILE).check()
     study = load_study(file)
     if study.optimise is not None:
         output.remark("the table 'optimise' is not used here; `railsim optimise` varies its keys")
     assignments = [*study.assignments, *inputs["assignments"]]
     named = {"quantities": full_name(quantities)}
-    return StudySpec.of_file(study, assignments=assignments, **named, **kept)
+    return StudySpec.of_file(study, assignments=assignments, **named, **storage)

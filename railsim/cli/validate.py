@@ -32,7 +32,7 @@ def command(files: tuple[str, ...], output: cli.Output) -> int:
     for file in files:
         faults, kind, remarks = Faults(), "", list[Any]()
         with faults.caught():
-            kind, remarks = checked(file)
+            kind, remarks = check_one(file)
         told = [asdict(fault) | {"text": str(fault)} for fault in faults]
         said = [dict(vars(remark)) for remark in remarks]
         reports.append({"file": file, "kind": kind or None, "faults": told, "remarks": said})
@@ -49,7 +49,7 @@ def command(files: tuple[str, ...], output: cli.Output) -> int:
     return cli.WRONG_INPUT if any(report["faults"] for report in reports) else cli.DONE
 
 
-def checked(file: str) -> tuple[str, list[Any]]:
+def check_one(file: str) -> tuple[str, list[Any]]:
     """Check one file and return its kind and the remarks on it.
 
     Raises InputError: all its faults.

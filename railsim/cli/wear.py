@@ -23,14 +23,14 @@ Mix = tuple[tuple[str, float, float], ...]
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 
 
-def mix_option(name: str, what: str, amount: str) -> Decorator:
+def mix_option(name: str, subject: str, amount: str) -> Decorator:
     """Option, given repeatedly, for what runs at what speed and its share of the amount."""
     text = (
-        f"A {what}, its speed in m/s or with a unit, and its share of the {amount} in any unit; "
+        f"A {subject}, its speed in m/s or with a unit, and its share of the {amount} in any unit; "
         "may be repeated."
     )
     form = (str, cli.as_speed, float)
-    return cli.repeated(name, text, f"{what.upper()} V SHARE", form, required=True)
+    return cli.repeated(name, text, f"{subject.upper()} V SHARE", form, required=True)
 
 
 def amount_options(name: str, text: str, unit: str) -> Decorator:
@@ -75,11 +75,11 @@ def command(routes: Mix, limits: str, given: cli.Given, **how: Any) -> None:
     inputs = [replace(given, track=track).inputs() for track, _, _ in routes]
     ways = [(one.track, v, share) for one, (_, v, share) in zip(inputs, routes, strict=True)]
     (coach, track, settings), ends = inputs[0], load_wheel_limits(limits)
-    named = [{"track": way.name, "speed": v, "share": share} for way, v, share in ways]
+    runs = [{"track": way.name, "speed": v, "share": share} for way, v, share in ways]
     _remark_on_straights([one.track for one in inputs], how["output"])
     _carry_out(
         WHEELS,
-        {"vehicle": coach.name, "routes": named},
+        {"vehicle": coach.name, "routes": runs},
         partial(wear_loop, coach, ways, limits=ends, settings=settings),
         lambda found: {"rows": wear_rows(found, coach, track)},
         **how,
@@ -111,8 +111,8 @@ def rails(traffic: Mix, given: cli.Given, **how: Any) -> None:
     inputs = [replace(given, vehicle=vehicle).inputs() for vehicle, _, _ in traffic]
     mix = [(one.vehicle, v, share) for one, (_, v, share) in zip(inputs, traffic, strict=True)]
     _, worn, settings = inputs[0]
-    named = [{"vehicle": coach.name, "speed": v, "share": share} for coach, v, share in mix]
-    record = {"track": worn.name, "traffic": named}
+    runs = [{"vehicle": coach.name, "speed": v, "share": share} for coach, v, share in mix]
+    record = {"track": worn.name, "traffic": runs}
     _remark_on_straights([worn], how["output"])
     _carry_out(RAILS, record, partial(rail_wear, worn, mix, settings=settings), rail_rows, **how)
 
@@ -130,8 +130,8 @@ def _remark_on_straights(tracks: "Sequence[Track]", output: cli.Output) -> None:
 
 
 def _carry_out(
-    of: Worn,
-    given: Mapping[str, Any],
+    part: Worn,
+    inputs: Mapping[str, Any],
     loop: "Callable[..., list[WearStep]]",
     rows_of: "Callable[[list[WearStep]], Rows]",
     *,
@@ -142,7 +142,7 @@ def _carry_out(
 ) -> None:
     """Run a study of wear, write and print it.
 
-    `given`: name of what wears, and its runs with speeds and shares; they stand first in the
+    `inputs`: name of what wears, and its runs with speeds and shares; they stand first in the
     record; `rows_of`: makes rows of each profile from the steps.
     """
     from railsim.assessment.wear import wear_law
@@ -150,69 +150,69 @@ def _carry_out(
     from railsim.profiles import profile_text
     from railsim.studies.wear_loop import since_new
 
-    steps = _number_of_steps(of, distance, step)
-    amounts = [of.scale * step * (number + 1) for number in range(steps)]
-    profiles = [_file_name(of, at, side) for at in amounts for side in of.sides]
+    steps = _number_of_steps(part, distance, step)
+    amounts = [part.scale * step * (number + 1) for number in range(steps)]
+    profiles = [_file_name(part, at, side) for at in amounts for side in part.sides]
     folder = output.reserve(RECORD, PICTURE, *profiles, f"{STEPS}/")
-    found: list[WearStep] = []
+    results: list[WearStep] = []
     remarks: list[str] = []
 
     def remark(words: str) -> None:
         remarks.append(words)
         output.remark(words)
 
-    ended = None
-    told = {"law": law, "on_step": found.append, "on_remark": remark}
-    told["folder"] = folder and folder / STEPS
+    failure = None
+    options = {"law": law, "on_step": results.append, "on_remark": remark}
+    options["folder"] = folder and folder / STEPS
     try:
         with output.progress("wear") as progress:
-            loop(step=of.scale * step, steps=steps, progress=progress, **told)
+            loop(step=part.scale * step, steps=steps, progress=progress, **options)
     except RailsimError as error:
-        if not found:
+        if not results:
             raise
-        ended = error
-    rows = rows_of(found)
-    record: dict[str, Any] = {**given, "step": of.scale * step, "law": law, **rows}
-    record |= {"remarks": remarks, "ended": None if ended is None else str(ended)}
+        failure = error
+    rows = rows_of(results)
+    record: dict[str, Any] = {**inputs, "step": part.scale * step, "law": law, **rows}
+    record |= {"remarks": remarks, "ended": None if failure is None else str(failure)}
     files: dict[str, Any] = {RECORD: record} | {
-        _file_name(of, done.distance + done.length, side): profile_text(one)
-        for done in found
+        _file_name(part, done.distance + done.length, side): profile_text(one)
+        for done in results
         for side, one in done.worn_profiles.items()
     }
-    worn = {side: [(at, one) for at, one, _ in since_new(found, side)] for side in of.sides}
+    worn = {side: [(at, one) for at, one, _ in since_new(results, side)] for side in part.sides}
     if "rows" in rows:
-        title = f"{given['vehicle']}: wear of the wheels"
-        files[PICTURE] = partial(wear_figure, worn[of.sides[0]], rows["rows"], title)
+        title = f"{inputs['vehicle']}: wear of the wheels"
+        files[PICTURE] = partial(wear_figure, worn[part.sides[0]], rows["rows"], title)
     else:
-        files[PICTURE] = partial(rail_wear_figure, worn, f"{given['track']}: wear of the rails")
+        files[PICTURE] = partial(rail_wear_figure, worn, f"{inputs['track']}: wear of the rails")
     output.write_all(files)
-    if ended is None or not output.as_json:
-        output.answer(record, _parts(of, given, wear_law(law).source, rows))
-    if ended is not None:
-        raise ended
+    if failure is None or not output.as_json:
+        output.answer(record, _parts(part, inputs, wear_law(law).source, rows))
+    if failure is not None:
+        raise failure
 
 
-def _file_name(of: Worn, amount: float, side: str) -> str:
-    return f"{side}_{amount / of.scale:g}_{of.unit}.csv"
+def _file_name(part: Worn, amount: float, side: str) -> str:
+    return f"{side}_{amount / part.scale:g}_{part.unit}.csv"
 
 
-def _number_of_steps(of: Worn, distance: float, step: float) -> int:
+def _number_of_steps(part: Worn, distance: float, step: float) -> int:
     Faults(
         Fault(option, "", f"found {value:.12g}", "above 0")
-        for option, value in ((f"--{of.amount}", distance), ("--step", step))
+        for option, value in ((f"--{part.amount}", distance), ("--step", step))
         if not 0.0 < value < float("inf")
     ).check()
     steps = round(min(distance / step, MOST_STEPS + 1.0))
     if not 1 <= steps <= MOST_STEPS or abs(steps * step - distance) > 1e-9 * distance:
-        found = f"found {step:.12g} {of.unit} with a {of.amount} of {distance:.12g} {of.unit}"
-        allowed = f"the {of.amount} divided by a whole number from 1 to {MOST_STEPS}"
+        found = f"found {step:.12g} {part.unit} with a {part.amount} of {distance:.12g} {part.unit}"
+        allowed = f"the {part.amount} divided by a whole number from 1 to {MOST_STEPS}"
         raise input_error("--step", found, allowed)
     return steps
 
 
-def _parts(of: Worn, given: Mapping[str, Any], source: str, rows: Rows) -> "list[str | Table]":
-    worn, runs = given.values()
-    parts: list[str | Table] = [worn, f"  {shares_of(runs)}", f"  {source}, {of.note}"]
-    for table in wear_tables(of, rows):
+def _parts(part: Worn, inputs: Mapping[str, Any], source: str, rows: Rows) -> "list[str | Table]":
+    worn, runs = inputs.values()
+    parts: list[str | Table] = [worn, f"  {shares_of(runs)}", f"  {source}, {part.note}"]
+    for table in wear_tables(part, rows):
         parts += ["", table]
     return parts

@@ -30,7 +30,7 @@ from railsim.version import __version__
 class MapPoint:
     """One point of a map: the inputs that differ between points."""
 
-    at: dict[str, float]  # by name: ``conicity``, ``friction`` or the path of a key
+    values: dict[str, float]  # by name: ``conicity``, ``friction`` or the path of a key
     vehicle: Vehicle  # definitions have the values of the point, except its conicity
     track: Track
     settings: Settings
@@ -56,7 +56,7 @@ def stability_map(
     contact = options["linearisation"], options["amplitude"]
     others = {"linearisation", "amplitude", "over_amplitude"}
     search_options = {name: value for name, value in options.items() if name not in others}
-    for conicity in dict.fromkeys(point.at.get("conicity") for point in points):
+    for conicity in dict.fromkeys(point.values.get("conicity") for point in points):
         checked(Contact(*contact, conicity), **search_options)  # before the first point is computed
     paths = [_stored_path(folder, point, options) for point in points]
     stored = {} if overwrite else {k: stored_record(p, on_remark) for k, p in enumerate(paths)}
@@ -89,16 +89,16 @@ def _compute(
 
 def point_record(point: MapPoint, options: dict[str, Any]) -> Record:
     """Record of one point."""
-    conicity = {"conicity": point.at["conicity"]} if "conicity" in point.at else {}
+    conicity = {"conicity": point.values["conicity"]} if "conicity" in point.values else {}
     try:
         speeds = critical_speed(
             point.vehicle, point.track, settings=point.settings, **{**options, **conicity}
         )
     except RailsimError as error:
-        where = ", ".join(f"{name} {value}" for name, value in point.at.items())
+        where = ", ".join(f"{name} {value}" for name, value in point.values.items())
         why = f"{where}: {error}"
-        return {"at": point.at, "linear": None, "nonlinear": None, "remarks": [why]}
-    return {"at": point.at, **speeds.record()}
+        return {"at": point.values, "linear": None, "nonlinear": None, "remarks": [why]}
+    return {"at": point.values, **speeds.record()}
 
 
 def _stored_path(folder: Path | None, point: MapPoint, options: dict[str, Any]) -> Path | None:
@@ -106,7 +106,7 @@ def _stored_path(folder: Path | None, point: MapPoint, options: dict[str, Any]) 
         return None
     files: list[Any] = [part.to_toml() for part in (point.vehicle, point.track, point.settings)]
     files.append(profile_hashes(point.vehicle, point.track))
-    text = json.dumps([__version__, *files, point.at, options], sort_keys=True)
+    text = json.dumps([__version__, *files, point.values, options], sort_keys=True)
     return folder / "points" / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
 
 

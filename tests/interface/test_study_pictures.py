@@ -15,7 +15,7 @@ from test_study import simulated as simulated
 import railsim
 import railsim.studies.case
 from railsim.cli import main
-from railsim.cli.plot import _joined, _study_figure
+from railsim.cli.plot import _combine, _study_figure
 from railsim.compare import differences
 from railsim.plot.study import Column, curves_figure, map_figure, ranking_figure
 
@@ -56,7 +56,7 @@ def test_medians_mix_no_vehicles_and_say_what_else(folder):
     assert "Not told apart: track.friction (options" in figure.get_suptitle()
     by_friction = _study_figure(str(folder), ("Y_peak",), None, "track.friction", None)
     assert "Not told apart: vehicle (options" in by_friction.get_suptitle()
-    both = _joined([Column("Vehicle", ["a", "b"]), Column("Track", ["t", "u"])])
+    both = _combine([Column("Vehicle", ["a", "b"]), Column("Track", ["t", "u"])])
     assert (both.words, both.values) == ("Vehicle, Track", ["a, t", "b, u"])
 
 
