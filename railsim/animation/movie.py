@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from railsim.animation.scene import Drawn, Scene
+from railsim.animation.scene import DrawnBody, Scene
 from railsim.arrays import Floats
 from railsim.errors import argument_error
 from railsim.files.access import check_file, whole_file
@@ -90,18 +90,18 @@ def _extent(scene: Scene) -> tuple[Floats, Floats]:
         for body in scene.bodies
         for points in _shape(body)
     ]
-    seen, _ = _seen(np.concatenate(points), np.zeros(4))
-    return seen.min(axis=0) - MARGIN, seen.max(axis=0) + MARGIN
+    corners, _ = _on_screen(np.concatenate(points), np.zeros(4))
+    return corners.min(axis=0) - MARGIN, corners.max(axis=0) + MARGIN
 
 
 def _polygons(scene: Scene, frame: int, gain: float) -> Iterator[tuple[float, Floats, Any, Any]]:
     s0 = float(scene.distance[frame])
-    at = _track(scene, s0)
+    pose = _track(scene, s0)
     for side in (-0.75, 0.75):
         for s in np.arange(s0 - 22.0, s0 + 22.0, 2.0):
-            ends = [_space(_track(scene, s + d), np.array([[0.0, side - w, 0.0]]))
+            ends = [_in_space(_track(scene, s + d), np.array([[0.0, side - w, 0.0]]))
                     for d, w in ((0.0, 0.04), (0.0, -0.04), (2.0, -0.04), (2.0, 0.04))]  # fmt: skip
-            points, depth = _seen(np.concatenate(ends), at)
+            points, depth = _on_screen(np.concatenate(ends), pose)
             yield depth, points, "#8a8a8a", "#6b6b6b"
     for k, body in enumerate(scene.bodies):
         q = scene.pose[frame, k]
@@ -110,14 +110,14 @@ def _polygons(scene: Scene, frame: int, gain: float) -> Iterator[tuple[float, Fl
         roll, pitch, yaw = gain * q[3:]
         pitch = 0.0 if body.kind == "wheelset" else pitch  # its rims are round
         for points in _shape(body):
-            moved = _turned(points, roll, pitch, yaw) + np.array(
+            turned = _turned(points, roll, pitch, yaw) + np.array(
                 [(gain - 1.0) * q[0], body.y + gain * q[1], body.z + gain * q[2]]
             )
-            seen, depth = _seen(_space(frame_at, moved), at)
-            yield depth, seen, face, edge
+            corners, depth = _on_screen(_in_space(frame_at, turned), pose)
+            yield depth, corners, face, edge
 
 
-def _shape(body: Drawn) -> list[Floats]:
+def _shape(body: DrawnBody) -> list[Floats]:
     """Polygons of a body in its own axes."""
     a, b, c, *middle = body.box
     if body.kind == "wheelset":
@@ -139,9 +139,9 @@ def _rotated(a: Floats, b: Floats, angle: float) -> tuple[Floats, Floats]:
     return np.cos(angle) * a - np.sin(angle) * b, np.sin(angle) * a + np.cos(angle) * b
 
 
-def _space(at: Floats, points: Floats) -> Floats:
+def _in_space(pose: Floats, points: Floats) -> Floats:
     """Points of the track frame in space."""
-    x, y, heading, cant = at
+    x, y, heading, cant = pose
     across, down = _rotated(points[:, 1], points[:, 2], cant)
     east, south = _rotated(points[:, 0], across, heading)
     return np.column_stack([x + east, y + south, down])
@@ -156,10 +156,10 @@ def _turned(points: Floats, roll: float, pitch: float, yaw: float) -> Floats:
     return np.column_stack([x, y, z])
 
 
-def _seen(points: Floats, at: Floats) -> tuple[Floats, float]:
+def _on_screen(points: Floats, pose: Floats) -> tuple[Floats, float]:
     """Points on the screen, right and down [m], and their mean depth."""
     x, y, z = points.T
-    forward, right = _rotated(x - at[0], y - at[1], -(at[2] + AZIMUTH))
+    forward, right = _rotated(x - pose[0], y - pose[1], -(pose[2] + AZIMUTH))
     down, depth = _rotated(z + 1.4, forward, ELEVATION)
     return np.column_stack([right, down]), float(np.mean(depth))
 

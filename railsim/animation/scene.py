@@ -29,7 +29,7 @@ LARGEST = 0.05  # displacement of a mode over the vehicle's length
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnBody:
     """A body to draw."""
 
     name: str
@@ -61,7 +61,7 @@ class Scene:
     """
 
     title: str
-    bodies: tuple[Drawn, ...]
+    bodies: tuple[DrawnBody, ...]
     time: Floats
     distance: Floats
     pose: Floats
@@ -102,7 +102,7 @@ def result_scene(
     rows = np.unique(np.linspace(first, last - 1, min(frames, last - first)).astype(int))
     vehicle = result.vehicle()
     flat = flatten(vehicle)
-    drawn = _drawn(flat)
+    drawn = _bodies_to_draw(flat)
     columns = [result.bodies.index(body.name) for body in drawn]
     known = "patch_N" in result
     patches = {name: result[f"patch_{name}"][rows] for name in "yzN"} if known else None
@@ -164,7 +164,7 @@ def mode_scene(
     im]}. Raises InputError: the shape names bodies that the vehicle does not have.
     """
     flat = flatten(vehicle)
-    drawn = _drawn(flat)
+    drawn = _bodies_to_draw(flat)
     names = [body.name for body in drawn]
     shape = np.zeros((len(drawn), 6), dtype=complex)
     known = {body.name for body in flat.bodies}
@@ -196,7 +196,7 @@ def mode_scene(
     )  # fmt: skip
 
 
-def _largest(body: Drawn, shape: np.ndarray) -> float:
+def _largest(body: DrawnBody, shape: np.ndarray) -> float:
     """Largest displacement of a body's corners in a mode, over all phases along each axis [m]."""
     a, b, c, *middle = body.box
     half = a if body.kind == "wheelset" else c
@@ -204,23 +204,23 @@ def _largest(body: Drawn, shape: np.ndarray) -> float:
     return float(np.max(np.abs(shape[:3] + np.cross(shape[3:], corners + middle))))
 
 
-def _drawn(flat: FlatVehicle) -> tuple[Drawn, ...]:
+def _bodies_to_draw(flat: FlatVehicle) -> tuple[DrawnBody, ...]:
     """Bodies with boxes; axleboxes are not drawn."""
     boxes = body_boxes(flat)
     reference = flat.body(flat.reference).position[0]
-    found = []
+    bodies = []
     for body in flat.bodies:
         x, y, z = body.position
         if body.kind == "wheelset" and body.wheelset:
             radius = float(np.mean(body.wheelset.radius))
             box = (radius, 0.5 * body.wheelset.tape_circle_distance, 0.0, 0.0, 0.0, 0.0)
-            found.append(Drawn(body.name, "wheelset", x - reference, y, z, box))
+            bodies.append(DrawnBody(body.name, "wheelset", x - reference, y, z, box))
         elif body.name in boxes:
             low, high = map(np.array, boxes[body.name])
             sizes = [*0.5 * (high - low), *0.5 * (high + low) - body.position]
             kind = "car" if body.name == flat.reference else "frame"
-            found.append(Drawn(body.name, kind, x - reference, y, z, tuple(map(float, sizes))))
-    return tuple(found)
+            bodies.append(DrawnBody(body.name, kind, x - reference, y, z, tuple(map(float, sizes))))
+    return tuple(bodies)
 
 
 def _track(alignment: Alignment, distance: Floats) -> dict[str, Floats]:
@@ -239,20 +239,20 @@ def _track(alignment: Alignment, distance: Floats) -> dict[str, Floats]:
 
 
 def chosen_mode(
-    modes: Sequence[Mapping[str, Any]], wanted: str | None, option: str = "--mode"
+    modes: Sequence[Mapping[str, Any]], name: str | None, option: str = "--mode"
 ) -> Mapping[str, Any]:
     """Mode by name or number (from 1); the first one by default; `option` asks for it.
 
     Raises InputError: there is none of this name.
     """
     names = [str(mode["name"]) for mode in modes]
-    if wanted is None:
+    if name is None:
         return modes[0]
-    if wanted.isdigit() and 1 <= int(wanted) <= len(modes):
-        return modes[int(wanted) - 1]
-    if wanted not in names:
-        raise input_error(option, "no such mode", nearest(wanted, names), wanted)
-    return modes[names.index(wanted)]
+    if name.isdigit() and 1 <= int(name) <= len(modes):
+        return modes[int(name) - 1]
+    if name not in names:
+        raise input_error(option, "no such mode", nearest(name, names), name)
+    return modes[names.index(name)]
 
 
 Section = Mapping[str, Floats]
@@ -270,7 +270,7 @@ def sections(result: Result, flat: FlatVehicle) -> Profiles:
     ``rail_y``, ``rail_z`` in track axes, y rising [m].
     """
     track = result.track()
-    found = []
+    wheelsets = []
     for body in flat.of_kind("wheelset"):
         assert body.wheelset is not None  # of its kind
         tape = tape_circle_position(body.wheelset.back_to_back)
@@ -278,18 +278,18 @@ def sections(result: Result, flat: FlatVehicle) -> Profiles:
         for side, sign in ((0, -1.0), (1, 1.0)):
             wheel = result.profiles[body.wheelset.profile[side]]
             rail = rail_curve(result.profiles[track.rail[side]], track.gauge, track.inclination)
-            part = _thinned(rail.z.size)[:: int(sign)]
-            rows = _thinned(len(wheel.y))
+            part = _sample_rows(rail.z.size)[:: int(sign)]
+            rows = _sample_rows(len(wheel.y))
             pair.append({
                 "wheel_y": sign * (tape + wheel.y[rows]),
                 "wheel_z": body.wheelset.radius[side] + wheel.z[rows],
                 "rail_y": sign * rail.Y[part], "rail_z": rail.z[part],
             })  # fmt: skip
-        found.append(tuple(pair))
-    return tuple(found)
+        wheelsets.append(tuple(pair))
+    return tuple(wheelsets)
 
 
-def _thinned(length: int) -> Floats:
+def _sample_rows(length: int) -> Floats:
     return np.unique(np.linspace(0, length - 1, min(POINTS, length)).astype(int))
 
 

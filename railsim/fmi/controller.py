@@ -109,22 +109,22 @@ class Controller:
         self.close()
 
 
-def _reference(file: str, known: Mapping[str, Any], name: str) -> int:
+def _reference(file: str, variables: Mapping[str, Any], name: str) -> int:
     """Return the reference of a unit's variable, a number without dimensions."""
-    if name not in known:
-        raise input_error(file, "no such variable", nearest(name, known), key=name)
-    if known[name].type != "Float64" or known[name].dimensions:
-        raise input_error(file, f"a {known[name].type}", "one Float64", key=name)
-    reference: int = known[name].valueReference
+    if name not in variables:
+        raise input_error(file, "no such variable", nearest(name, variables), key=name)
+    if variables[name].type != "Float64" or variables[name].dimensions:
+        raise input_error(file, f"a {variables[name].type}", "one Float64", key=name)
+    reference: int = variables[name].valueReference
     return reference
 
 
-def _value(simulation: Simulation, at: str) -> float:
+def _value(simulation: Simulation, address: str) -> float:
     """Return a signal, or a member of a quantity."""
-    name, *indices = at.split(":")
-    value = simulation.read(at if at in simulation.readable else name)
+    name, *indices = address.split(":")
+    value = simulation.read(address if address in simulation.readable else name)
     try:
         return float(np.asarray(value)[tuple(int(i) for i in indices)])
     except (IndexError, ValueError, TypeError):
         allowed = f"indices within {np.shape(value)}"
-        raise argument_error("inputs", "no such member", allowed, key=at) from None
+        raise argument_error("inputs", "no such member", allowed, key=address) from None

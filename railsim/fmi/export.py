@@ -110,16 +110,16 @@ def _check_names(facts: Mapping[str, Any]) -> None:
 
 
 def _commands(
-    vehicle: Vehicle, actuators: Sequence[str], wanted: Sequence[str] | None
+    vehicle: Vehicle, actuators: Sequence[str], names: Sequence[str] | None
 ) -> list[dict[str, Any]]:
     elements = {element.name: element.definition for element in flatten(vehicle).elements}
-    if wanted is None:
+    if names is None:
         followed = {name for c in (vehicle.controllers or {}).values() for name in c.outputs}
-        wanted = [name for name in actuators if name not in followed]
-    for name in wanted:
+        names = [name for name in actuators if name not in followed]
+    for name in names:
         check_command(vehicle, "inputs", name, actuators)
     # a law knows the unit of its own command
-    units = {name: getattr(elements[name], "command_unit", "") for name in wanted}
+    units = {name: getattr(elements[name], "command_unit", "") for name in names}
     words = "command of actuator "
     return [
         {"name": n, "start": 0.0, "unit": u, "description": words + n} for n, u in units.items()
@@ -127,16 +127,16 @@ def _commands(
 
 
 def _variables(
-    vehicle: Vehicle, result: Result, signals: Sequence[str], wanted: Sequence[str]
+    vehicle: Vehicle, result: Result, signals: Sequence[str], names: Sequence[str]
 ) -> list[dict[str, Any]]:
     """Return name, quantity, place in its array, unit and words of every output."""
     with changed_faults(lambda fault: replace(fault, file="outputs", option="--outputs")):
-        panels(result, [one for one in wanted if one not in signals])  # all faults at once
-    found: dict[str, dict[str, Any]] = {}
-    for selection in wanted:
+        panels(result, [one for one in names if one not in signals])  # all faults at once
+    variables: dict[str, dict[str, Any]] = {}
+    for selection in names:
         if selection in signals:
             words, unit = f"signal {selection}", (vehicle.signals or {})[selection].unit
-            found[selection] = _variable(selection, selection, [], unit, words)
+            variables[selection] = _variable(selection, selection, [], unit, words)
             continue
         quantity = selection.partition(":")[0]
         for panel in panels(result, [selection]):
@@ -149,10 +149,10 @@ def _variables(
                 ]
                 name = ".".join((quantity, *labels))
                 words = ", ".join((panel.quantity.long_name, *labels))
-                found[name] = _variable(name, quantity, at, panel.quantity.unit, words)
-    if not found:
+                variables[name] = _variable(name, quantity, at, panel.quantity.unit, words)
+    if not variables:
         raise input_error("outputs", "found none", "at least one quantity or signal")
-    return list(found.values())
+    return list(variables.values())
 
 
 def _variable(name: str, quantity: str, at: list[int], unit: str, words: str) -> dict[str, Any]:

@@ -171,13 +171,13 @@ class Unit:
             "values": dict(self._values),
             "status": self._status,
             "time": [self._begin, self._time],
-            "state": _saved(self._run.state),
+            "state": _state_to_json(self._run.state),
         }
 
-    def _set_fmu_state(self, saved: dict[str, Any]) -> None:
-        self._commands, self._values = dict(saved["commands"]), dict(saved["values"])
-        self._status, (self._begin, self._time) = saved["status"], saved["time"]
-        self._run.state = _restored(saved["state"])
+    def _set_fmu_state(self, data: dict[str, Any]) -> None:
+        self._commands, self._values = dict(data["commands"]), dict(data["values"])
+        self._status, (self._begin, self._time) = data["status"], data["time"]
+        self._run.state = _state_from_json(data["state"])
 
 
 def exponents(unit: str) -> dict[str, int] | None:
@@ -201,20 +201,20 @@ def exponents(unit: str) -> dict[str, int] | None:
     return found
 
 
-def _saved(state: SavedState) -> dict[str, Any]:
+def _state_to_json(state: SavedState) -> dict[str, Any]:
     """Return a state as JSON holds it."""
     return {
         "motion": _text(state.motion),
-        "counted": [_text(one) for one in state.counted],
+        "counted": [_text(array) for array in state.counted],
         "grid": list(state.grid),
-        "begun": state.begun and _saved(state.begun),
+        "begun": state.begun and _state_to_json(state.begun),
     }
 
 
-def _restored(saved: dict[str, Any]) -> SavedState:
-    counted = tuple(_array(one) for one in saved["counted"])
-    begun = saved["begun"] and _restored(saved["begun"])
-    return SavedState(_array(saved["motion"]), counted, tuple(saved["grid"]), begun)
+def _state_from_json(data: dict[str, Any]) -> SavedState:
+    counted = tuple(_array(text) for text in data["counted"])
+    begun = data["begun"] and _state_from_json(data["begun"])
+    return SavedState(_array(data["motion"]), counted, tuple(data["grid"]), begun)
 
 
 def _text(array: Any) -> list[Any]:

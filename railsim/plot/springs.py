@@ -22,7 +22,7 @@ from railsim.springs.arm import Arm
 from railsim.springs.design import Design
 from railsim.springs.summary import coils_by_wire
 from railsim.springs.tolerance import RideHeight
-from railsim.springs.verification import Case, Fatigue, Verification, built, solid_heights
+from railsim.springs.verification import Case, Fatigue, Verification, solid_heights, wire_and_coils
 from railsim.text import unformatted
 
 if TYPE_CHECKING:
@@ -265,7 +265,7 @@ def _draw_arm(
     _line(axes, hinge, axle, lw=4.5, **steel)
     for spring, coil, seat in zip(suspension.springs.values(), arm.coils, seats, strict=True):
         top = hinge + length * right + 1e3 * float(coil.seat + coil.H0 - coil.start) * up
-        d, n = built(spring)
+        d, n = wire_and_coils(spring)
         turns = checks.total_coils(n, suspension.checks.dead_coils, suspension.checks.end_coils)
         # a spring that does not work yet stands on its seat with its free height
         share = min(1.0, 1e3 * spring.free_height / float(np.hypot(*(top - seat))))

@@ -125,7 +125,7 @@ def rotation_of_rise(length: Values, seat: Values, rise: Values) -> Values:
 
 def coil_state(arm: Arm, coil: Coil, phi: Values) -> CoilState:
     """One spring of the arm at rotation `phi` [rad]."""
-    deflection, lateral, *beam = _deformed(arm, coil, phi)
+    deflection, lateral, *beam = _deformation(arm, coil, phi)
     K_L, K_C = (_flush(deflection, coil.D) * K for K in beam)
     height, force = coil.H0 - deflection, coil.K_V * deflection
     return CoilState(deflection, lateral, height, K_L, K_C, force)
@@ -220,13 +220,13 @@ def mounting_deflection(P: float, stiffnesses: Sequence[Values], engagement: flo
 
 def _unit_energy(arm: Arm, coil: Coil, phi: Values) -> Values:
     """Stored energy of one spring over its vertical stiffness, at a real or complex rotation."""
-    dz, dx, K_L, K_C = _deformed(arm, replace(coil, K_V=1.0), phi)
+    dz, dx, K_L, K_C = _deformation(arm, replace(coil, K_V=1.0), phi)
     coupling = helical.seat_moment(dz, K_L, coil.H0 - dz)
     sheared = 0.5 * (K_L * dx**2 + K_C * phi**2) + coupling * dx * phi
     return 0.5 * dz**2 + _flush(dz, coil.D) * sheared
 
 
-def _deformed(arm: Arm, coil: Coil, phi: Values) -> tuple[Values, Values, Values, Values]:
+def _deformation(arm: Arm, coil: Coil, phi: Values) -> tuple[Values, Values, Values, Values]:
     """Deflection, sideways displacement, lateral and tilting stiffness of a flush spring."""
     rise, dx = displacement(arm.length, coil.seat, phi)
     travel = coil.start + rise

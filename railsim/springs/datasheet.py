@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from railsim.definitions.spring import TrailingArmSuspension
 from railsim.springs import checks, helical
-from railsim.springs.verification import Verification, built, solid_heights, stress
+from railsim.springs.verification import Verification, solid_heights, stress, wire_and_coils
 
 LATERAL = ("Grossi", "EN 13906-1", "Wahl, C_l = 1")
 """Methods of the lateral stiffness; no free source gives those of Gross and Sparing."""
@@ -43,7 +43,7 @@ def data_sheets(suspension: TrailingArmSuspension, result: Verification) -> dict
     material, limits = suspension.material, suspension.checks
     sheets = {}
     for (name, spring), coil in zip(suspension.springs.items(), result.arm.coils, strict=True):
-        (d, n), D, H0 = built(spring), spring.mean_diameter, spring.free_height
+        (d, n), D, H0 = wire_and_coils(spring), spring.mean_diameter, spring.free_height
         n_t = checks.total_coils(n, limits.dead_coils, limits.end_coils)
         solid = solid_heights(suspension)[name]
         loads = {}

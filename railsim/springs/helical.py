@@ -171,13 +171,13 @@ def buckling_deflection(H0: Values, D: Values, nu: Values, seating: Values = 1.0
     return np.where(root >= 0.0, deflection, np.inf)
 
 
-def _by_series_or_closed(y: Values, closed: Any, coefficients: tuple[float, ...]) -> Values:
+def _by_series_or_closed(y: Values, closed_form: Any, coefficients: tuple[float, ...]) -> Values:
     """`closed(y)` where y is large enough, else the power series with `coefficients`."""
     small = np.abs(y) < _SERIES_BELOW
     series = np.zeros_like(y)
     for coefficient in reversed(coefficients):
         series = series * y + coefficient
-    return np.where(small, series, closed(np.where(small, 1.0, y)))
+    return np.where(small, series, closed_form(np.where(small, 1.0, y)))
 
 
 def _tangent_remainder(y: Values) -> Values:

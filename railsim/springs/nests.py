@@ -17,7 +17,7 @@ from railsim.errors import Fault, InputError
 from railsim.springs import arm as trailing_arm
 from railsim.springs import checks, helical
 from railsim.springs.arm import Coil, CoilState
-from railsim.springs.design import Wanted, stiffnesses
+from railsim.springs.design import Demand, stiffnesses
 from railsim.springs.verification import dynamic_loads
 
 # Diameters of hot rolled round steel bars for general purposes, EN 10060:2003, 10 to 60 mm [m].
@@ -35,7 +35,7 @@ class Task:
 
     suspension: TrailingArmSuspension
     limits: Search  # its table [search]
-    wanted: Wanted  # loads and deflections to be met
+    demand: Demand  # loads and deflections to be met
     wires: Floats  # wire diameters to choose from [m]
     height_difference: float  # free height of the outer spring less that of the inner one [m]
     loads: Floats  # largest, for the solid height, highest and lowest dynamic load [N]
@@ -50,9 +50,9 @@ class Dimensions:
     H0: Floats  # free height of the outer spring, (nest,)
 
     @classmethod
-    def joined(cls, some: Sequence["Dimensions"]) -> "Dimensions":
+    def concatenated(cls, nests: Sequence["Dimensions"]) -> "Dimensions":
         """Nests of several."""
-        parts = zip(*(vars(one).values() for one in some), strict=True)
+        parts = zip(*(vars(one).values() for one in nests), strict=True)
         return cls(*(np.concatenate(part, axis=-1) for part in parts))
 
 
@@ -101,7 +101,7 @@ def task_of(suspension: TrailingArmSuspension) -> Task:
                 "fatigue_margin_min": max(limits.fatigue_margin_min, checked.fatigue_margin),
             }
         ),
-        wanted=Wanted(mounting.load, mounting.deflection, target.load, target.deflection),
+        demand=Demand(mounting.load, mounting.deflection, target.load, target.deflection),
         wires=np.array(limits.wire_diameters or EN_10060),
         height_difference=suspension.outer.free_height - inner.free_height,
         loads=np.array([largest, solid_load, *dynamic]),
@@ -114,35 +114,35 @@ def evaluate(task: Task, x: Dimensions, n: Floats | None = None) -> Evaluation:
     `n` are numbers of coils as built, (spring, nest); by default those that the wanted deflections
     need.
     """
-    suspension, wanted = task.suspension, task.wanted
+    suspension, demand = task.suspension, task.demand
     G, engagement = suspension.material.G, suspension.engagement
     H0 = np.stack([x.H0, x.H0 - task.height_difference])
     # nan where the dimensions make no spring
-    sane = np.all(x.d < x.D, axis=0) & (wanted.target_deflection < np.min(H0, axis=0))
+    sane = np.all(x.d < x.D, axis=0) & (demand.target_deflection < np.min(H0, axis=0))
     D, H0 = np.where(sane, x.D, np.nan), np.where(sane, H0, np.nan)
-    start = wanted.mounting_deflection
+    start = demand.mounting_deflection
     if n is None:
         sizes = [(1.0, *size) for size in zip(D, H0, strict=True)]
         arm = trailing_arm.nest(suspension, sizes, start)
-        K_V = np.stack(stiffnesses(arm, engagement, wanted)[:2])
+        K_V = np.stack(stiffnesses(arm, engagement, demand)[:2])
         K_V = np.where(np.all(K_V > 0.0, axis=0), K_V, np.nan)
         n, as_built = helical.active_coils(G, x.d, D, K_V), False
     else:
         K_V, as_built = helical.vertical_stiffness(G, x.d, D, n), True
-        start = trailing_arm.mounting_deflection(wanted.mounting_load, K_V, engagement)
+        start = trailing_arm.mounting_deflection(demand.mounting_load, K_V, engagement)
     arm = trailing_arm.nest(suspension, list(zip(K_V, D, H0, strict=True)), start)
     errors = np.zeros((2, len(x.H0)))
     if as_built:
-        at_target = trailing_arm.rotation(arm, wanted.target_load)
+        at_target = trailing_arm.rotation(arm, demand.target_load)
         deflection = trailing_arm.coil_state(arm, arm.coils[0], at_target).deflection
-        apart = start - wanted.mounting_deflection, deflection - wanted.target_deflection
+        apart = start - demand.mounting_deflection, deflection - demand.target_deflection
         errors = np.stack(apart)
     # the same arms with a last axis for the loads
     coils = (Coil(*(np.expand_dims(v, -1) for v in vars(coil).values())) for coil in arm.coils)
     arm = replace(arm, coils=tuple(coils))
     phi = trailing_arm.rotation(arm, task.loads)
     weaker = np.min(K_V, axis=0)
-    slack = _space_slack(task, x, weaker * wanted.mounting_deflection / wanted.mounting_load)
+    slack = _space_slack(task, x, weaker * demand.mounting_deflection / demand.mounting_load)
     slack["equilibrium"] = np.where(np.isfinite(weaker) & np.any(np.isnan(phi), axis=-1), -1.0, 1.0)
     n_t = checks.total_coils(n, suspension.checks.dead_coils, suspension.checks.end_coils)
     mass = np.sum(checks.mass(x.d, D, n_t, suspension.material.density), axis=0)

@@ -29,8 +29,8 @@ from railsim.springs import nests as many
 from railsim.springs.nests import Dimensions, Evaluation, Task, evaluate
 
 R = TypeVar("R")
-Asked = tuple[Dimensions, Floats | None]  # nests to be evaluated, and their coils as built, if any
-Steps = Generator[Asked, Evaluation, R]  # a search that asks for evaluations
+Query = tuple[Dimensions, Floats | None]  # nests to be evaluated, and their coils as built, if any
+Steps = Generator[Query, Evaluation, R]  # a search that asks for evaluations
 
 # limit: key of the file that loosens it, and how
 LIMITS = {
@@ -112,8 +112,8 @@ def search(suspension: TrailingArmSuspension) -> SearchResult:
     feasible = found.feasible
     leaders, merit = _leaders(task, sample, _merit(task, found))
     best = np.argsort(merit, kind="stable")[: task.limits.results + _SPARE]
-    optima = _abreast(task, [_optimum(task, leaders, int(i)) for i in best])
-    built = _abreast(task, [_built(task, optimum) for optimum in optima])
+    optima = _run_together(task, [_optimum(task, leaders, int(i)) for i in best])
+    built = _run_together(task, [_build(task, optimum) for optimum in optima])
     nests = [nest for nest in built if nest is not None]
     by_mass = task.limits.objective == "mass"
     nests.sort(key=lambda nest: nest.mass if by_mass else -nest.fatigue_margin)
@@ -170,11 +170,11 @@ class _Optimum:
         return tuple(name for name, value in self.slack.items() if value < ACTIVE)
 
 
-def _merit(task: Task, found: Evaluation) -> Floats:
+def _merit(task: Task, evaluation: Evaluation) -> Floats:
     """The aim, to be made small, and the worst violation, which no small mass may outweigh."""
-    slack = np.array(list(found.slack.values()))
+    slack = np.array(list(evaluation.slack.values()))
     violation = np.maximum(0.0, -np.min(np.nan_to_num(slack, nan=-1.0), axis=0))
-    merit: Floats = np.max(_aims(task, found), axis=0) + 3.0 * violation
+    merit: Floats = np.max(_aims(task, evaluation), axis=0) + 3.0 * violation
     return np.nan_to_num(merit, nan=np.inf)
 
 
@@ -208,28 +208,28 @@ def _leaders(task: Task, sample: Dimensions, merit: Floats) -> tuple[Dimensions,
     return Dimensions(d.T, x[:, :2].T, x[:, 2]), merit
 
 
-def _abreast(task: Task, searches: Sequence[Steps[R]]) -> list[R]:
+def _run_together(task: Task, searches: Sequence[Steps[R]]) -> list[R]:
     """Ends of searches that go on in step: nests that they ask for are evaluated in one call."""
-    asked: dict[int, Asked] = {}
+    queries: dict[int, Query] = {}
     ends: dict[int, R] = {}
 
-    def go_on(number: int, answer: Any = None) -> None:
+    def go_on(number: int, reply: Any = None) -> None:
         try:
-            asked[number] = searches[number].send(answer)
+            queries[number] = searches[number].send(reply)
         except StopIteration as end:
-            asked.pop(number, None)
+            queries.pop(number, None)
             ends[number] = end.value
 
     for number in range(len(searches)):
         go_on(number)
-    while asked:
-        nests = Dimensions.joined([nests for nests, _ in asked.values()])
-        coils = [n for _, n in asked.values() if n is not None]  # of all, or of none
-        found = evaluate(task, nests, np.concatenate(coils, axis=-1) if coils else None)
+    while queries:
+        nests = Dimensions.concatenated([nests for nests, _ in queries.values()])
+        coils = [n for _, n in queries.values() if n is not None]  # of all, or of none
+        evaluation = evaluate(task, nests, np.concatenate(coils, axis=-1) if coils else None)
         begin = 0
-        for number, (of_one, _) in list(asked.items()):
+        for number, (of_one, _) in list(queries.items()):
             end = begin + len(of_one.H0)
-            go_on(number, found.part(slice(begin, end)))
+            go_on(number, evaluation.part(slice(begin, end)))
             begin = end
     return [ends[number] for number in range(len(searches))]
 
@@ -247,38 +247,38 @@ def _optimum(task: Task, sample: Dimensions, start: int) -> Steps[_Optimum]:
     scale = np.array([largest, largest, longest])
     neighbours = np.vstack([np.zeros(3), _DIFFERENCE * np.eye(3)])
 
-    def at(points: Floats) -> Dimensions:
+    def dimensions_at(points: Floats) -> Dimensions:
         *D, H0 = (points * scale).T
         return Dimensions(np.repeat(d, len(points), axis=1), np.stack(D), H0)
 
-    def linearised(x: Floats) -> Steps[_Linearised]:
-        found = yield at(x + neighbours), None
-        aims = np.stack(_aims(task, found), axis=-1)
-        slack = np.stack(list(found.slack.values()), axis=-1)
+    def linearise(x: Floats) -> Steps[_Linearised]:
+        evaluation = yield dimensions_at(x + neighbours), None
+        aims = np.stack(_aims(task, evaluation), axis=-1)
+        slack = np.stack(list(evaluation.slack.values()), axis=-1)
         # far outside the model's range: finite, and clearly wrong
         aims = np.nan_to_num(aims, nan=1e3, posinf=1e3)
         slack = np.clip(np.nan_to_num(slack, nan=-1.0), -10.0, 10.0)
         slopes = [(block[1:] - block[0]).T / _DIFFERENCE for block in (aims, slack)]
-        return _Linearised(aims[0], slack[0], slopes[0], slopes[1], tuple(found.slack))
+        return _Linearised(aims[0], slack[0], slopes[0], slopes[1], tuple(evaluation.slack))
 
     w_min, w_max = task.limits.spring_index
     low = np.append(w_min * d, task.limits.free_height[0]) / scale
     high = np.append(w_max * d, longest) / scale
     x = np.append(sample.D[:, start], sample.H0[start]) / scale
-    here, reach = (yield from linearised(x)), _FIRST_BOX
+    here, reach = (yield from linearise(x)), _FIRST_BOX
     for _ in range(_PROGRAMS):
         box = np.maximum(low - x, -reach), np.minimum(high - x, reach)
         step, promised = _linear_step(here, *box)
         gain = here.merit - promised
         if gain < _CONVERGED or reach < _CONVERGED:
             break
-        there = yield from linearised(x + step)
+        there = yield from linearise(x + step)
         kept = (here.merit - there.merit) / gain
         if kept > 0.1:
             x, here = x + step, there
         reach = 1.5 * reach if kept > 0.7 else 0.35 * float(np.max(np.abs(step)))
     slack = dict(zip(here.names, here.slack.tolist(), strict=True))
-    return _Optimum(at(x[None, :]), slack)
+    return _Optimum(dimensions_at(x[None, :]), slack)
 
 
 @dataclass(frozen=True)
@@ -313,30 +313,30 @@ def _linear_step(here: _Linearised, low: Floats, high: Floats) -> tuple[Floats, 
     return solution.x[:3], float(solution.fun or 0.0)
 
 
-def _aims(task: Task, found: Evaluation) -> list[Floats]:
+def _aims(task: Task, evaluation: Evaluation) -> list[Floats]:
     """What is to be made small, of order one: the mass, or both springs' inverse margins."""
     if task.limits.objective == "mass":
-        return [found.mass / _MASS]
-    return [*(1.0 / found.margin)]
+        return [evaluation.mass / _MASS]
+    return [*(1.0 / evaluation.margin)]
 
 
-def _built(task: Task, found: _Optimum) -> Steps[Nest | None]:
+def _build(task: Task, optimum: _Optimum) -> Steps[Nest | None]:
     """The best rounding near an optimum that keeps every limit, None where none does."""
-    if found.worst < _NEARLY:
+    if optimum.worst < _NEARLY:
         return None
-    nest, best, at = None, np.inf, np.array([*found.dimensions.D[:, 0], *found.dimensions.H0])
-    while (nearby := (yield from _rounded(task, found, at))) is not None and nearby[0] < best:
-        best, nest = nearby
-        at = np.array([nest.outer.mean_diameter, nest.inner.mean_diameter, nest.outer.free_height])
+    nest, best, x0 = None, np.inf, np.array([*optimum.dimensions.D[:, 0], *optimum.dimensions.H0])
+    while (near := (yield from _round_nest(task, optimum, x0))) is not None and near[0] < best:
+        best, nest = near
+        x0 = np.array([nest.outer.mean_diameter, nest.inner.mean_diameter, nest.outer.free_height])
     return nest
 
 
-def _rounded(task: Task, found: _Optimum, around: Floats) -> Steps[tuple[float, Nest] | None]:
+def _round_nest(task: Task, optimum: _Optimum, around: Floats) -> Steps[tuple[float, Nest] | None]:
     """The best nest of whole steps around (D_outer, D_inner, H0), with its merit."""
     step, coil_step = task.limits.diameter_step, task.limits.coil_step
     near = np.array(list(product((-1, 0, 1, 2), repeat=3))).T
     *D, H0 = (np.floor(around / step + 1e-6)[:, None] + near) * step
-    rounded = Dimensions(np.repeat(found.dimensions.d, len(H0), axis=1), np.stack(D), H0)
+    rounded = Dimensions(np.repeat(optimum.dimensions.d, len(H0), axis=1), np.stack(D), H0)
     exact = (yield rounded, None).n
     x = Dimensions(*(np.repeat(value, 4, axis=-1) for value in vars(rounded).values()))
     up = np.tile([[0, 0, 1, 1], [0, 1, 0, 1]], len(H0))
@@ -359,7 +359,7 @@ def _rounded(task: Task, found: _Optimum, around: Floats) -> Steps[tuple[float, 
         outer=spring(0, x.H0), inner=spring(1, x.H0 - task.height_difference),
         mass=float(result.mass[best]), fatigue_margin=float(margin[best]),
         mounting_error=float(result.deflection_error[0][best]),
-        target_error=float(result.deflection_error[1][best]), active=found.active,
+        target_error=float(result.deflection_error[1][best]), active=optimum.active,
         slack={name: float(values[best]) for name, values in result.slack.items()},
     )  # fmt: skip
 

@@ -21,7 +21,7 @@ from railsim.errors import input_error
 from railsim.springs import arm as trailing_arm
 from railsim.springs import helical
 from railsim.springs.arm import Arm, Coil
-from railsim.springs.verification import built, load_cases
+from railsim.springs.verification import load_cases, wire_and_coils
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def _deviating(
     coils = []
     for (name, spring), coil in zip(suspension.springs.items(), frame.coils, strict=True):
         keys = "wire_diameter", "active_coils", "mean_diameter", "free_height"
-        each = zip((*built(spring), spring.mean_diameter, 0.0), keys, strict=True)
+        each = zip((*wire_and_coils(spring), spring.mean_diameter, 0.0), keys, strict=True)
         d, n, D, taller = (x + deviation.get(f"{name}.{key}", 0.0) for x, key in each)
         K_V = helical.vertical_stiffness(G, d, D, n)
         coils.append(Coil(K_V, D, coil.H0 + taller, coil.seat, coil.start + taller))

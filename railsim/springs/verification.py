@@ -1,6 +1,6 @@
 """Does a built suspension do what it should: all loads, all checks, fatigue.
 
-`mounted` turns the file's springs into an `Arm` that stands horizontal under the mounting load,
+`mounted_arm` turns the file's springs into an `Arm` that stands horizontal under the mounting load,
 `verify` answers for every load of the file and compares with the limits, `fatigue` for the dynamic
 loads.  A load that the nest cannot carry (solid, buckled, lifted off) is an input fault that names
 what to change; a check that is not met is a result.
@@ -74,8 +74,8 @@ class Verification:
     checks: tuple[Check, ...]
 
 
-def built(spring: HelicalSpring) -> tuple[float, float]:
-    """Wire diameter and active coils of a spring that has both (`mounted` checks that)."""
+def wire_and_coils(spring: HelicalSpring) -> tuple[float, float]:
+    """Wire diameter and active coils of a spring that has both (`mounted_arm` checks that)."""
     if spring.wire_diameter is None or spring.active_coils is None:
         raise ValueError("the spring has no wire diameter or no number of coils")
     return spring.wire_diameter, spring.active_coils
@@ -86,13 +86,13 @@ def solid_heights(suspension: TrailingArmSuspension) -> dict[str, float]:
     limits = suspension.checks
     found = {}
     for name, spring in suspension.springs.items():
-        d, n = built(spring)
+        d, n = wire_and_coils(spring)
         n_t = checks.total_coils(n, limits.dead_coils, limits.end_coils)
         found[name] = checks.solid_height(n_t, d)
     return found
 
 
-def mounted(suspension: TrailingArmSuspension) -> Arm:
+def mounted_arm(suspension: TrailingArmSuspension) -> Arm:
     """Return the arm with the file's springs, horizontal under the mounting load; or InputError."""
     needed = {"wire_diameter": "the wire diameter [m]"}
     needed["active_coils"] = "the number of active coils; see design"
@@ -111,7 +111,7 @@ def mounted(suspension: TrailingArmSuspension) -> Arm:
     faults.check()
     springs = []
     for spring in suspension.springs.values():
-        (d, n), D = built(spring), spring.mean_diameter
+        (d, n), D = wire_and_coils(spring), spring.mean_diameter
         K = helical.vertical_stiffness(suspension.material.G, d, D, n)
         springs.append((K, D, spring.free_height))
     K_V = [stiffness for stiffness, _, _ in springs]
@@ -131,7 +131,7 @@ def load_cases(
     suspension: TrailingArmSuspension, loads: Mapping[str, float], key: str = "loads"
 ) -> tuple[Arm, tuple[Case, ...]]:
     """Return the mounted arm and its state under loads [N] of the table `key`; or InputError."""
-    frame = mounted(suspension)
+    frame = mounted_arm(suspension)
     rotations = trailing_arm.rotation(frame, np.array(list(loads.values()))).tolist()
     cases = []
     obstacles: dict[str, list[tuple[str, str, str]]] = {}
@@ -211,7 +211,7 @@ def dynamic_loads(suspension: TrailingArmSuspension) -> dict[str, float]:
 def stress(spring: HelicalSpring, state: CoilState) -> float:
     """Largest corrected shear stress of a spring under load [Pa]."""
     shear = state.K_L * state.lateral
-    dimensions = (built(spring)[0], spring.mean_diameter)
+    dimensions = (wire_and_coils(spring)[0], spring.mean_diameter)
     under = state.force, shear, state.height, state.lateral
     return float(checks.corrected_stress(*dimensions, *under))
 
@@ -227,13 +227,13 @@ def _obstacle(
         found = f"{under} lifts the arm off its springs (below {lowest * 1e-3:.3f} kN)"
         return "lifted", found, "raise this load, or reduce mounting.load against it"
 
-    def met_at(coil: Coil, deflection: float) -> tuple[float, str]:
+    def reached_at(coil: Coil, deflection: float) -> tuple[float, str]:
         """Rotation and load at which a spring reaches a deflection, nan beyond the arm's reach."""
-        at = trailing_arm.rotation_of_rise(frame.length, coil.seat, deflection - coil.start)
-        load = f"{float(trailing_arm.load(frame, at)) * 1e-3:.1f} kN"
-        return float(np.nan_to_num(at, nan=np.inf)), load
+        rotation = trailing_arm.rotation_of_rise(frame.length, coil.seat, deflection - coil.start)
+        load = f"{float(trailing_arm.load(frame, rotation)) * 1e-3:.1f} kN"
+        return float(np.nan_to_num(rotation, nan=np.inf)), load
 
-    met: list[tuple[float, tuple[str, str, str]]] = []
+    obstacles: list[tuple[float, tuple[str, str, str]]] = []
     solid = solid_heights(suspension)
     for name, coil in zip(suspension.springs, frame.coils, strict=True):
         turned = highest_phi if np.isnan(phi) else phi
@@ -241,24 +241,24 @@ def _obstacle(
         seating = suspension.checks.seating
         buckling = float(helical.buckling_deflection(coil.H0, coil.D, frame.nu, seating))
         if coil.start + rise >= buckling:
-            at, there = met_at(coil, buckling)
-            end = f"{buckling * 1e3:.1f} mm, under {there}"
+            phi_end, load_end = reached_at(coil, buckling)
+            end = f"{buckling * 1e3:.1f} mm, under {load_end}"
             found = f"{under} buckles the {name} spring: it buckles at {end}"
             remedy = (
                 f"reduce {name}.free_height, raise {name}.mean_diameter, or hold the seats against "
                 "sideways movement (checks.seating = 0.5)"
             )
-            met.append((at, (f"{name} buckled", found, remedy)))
+            obstacles.append((phi_end, (f"{name} buckled", found, remedy)))
         travel = float(coil.H0) - solid[name]
         if coil.start + rise >= travel:
-            at, there = met_at(coil, travel)
-            end = f"{solid[name] * 1e3:.1f} mm is reached under {there}"
+            phi_end, load_end = reached_at(coil, travel)
+            end = f"{solid[name] * 1e3:.1f} mm is reached under {load_end}"
             found = f"{under} is beyond the solid height of the {name} spring: {end}"
             less = f"reduce this load, {name}.active_coils or {name}.wire_diameter"
             remedy = f"{less}, or raise {name}.free_height"
-            met.append((at, (f"{name} solid", found, remedy)))
-    if met:
-        return min(met, key=lambda item: item[0])[1]
+            obstacles.append((phi_end, (f"{name} solid", found, remedy)))
+    if obstacles:
+        return min(obstacles, key=lambda item: item[0])[1]
     if np.isnan(phi):
         found = f"{under}: no equilibrium of the arm up to {np.degrees(highest_phi):.1f} degrees"
         return "no equilibrium", found, "reduce this load or stiffen the springs"
@@ -274,7 +274,7 @@ def _checks(
     if limits.solid_load is not None:
         case = next(case for case in cases if case.name == limits.solid_load)
     each = zip(suspension.springs.items(), frame.coils, strict=True)
-    springs = {name: (*built(spring), coil) for (name, spring), coil in each}
+    springs = {name: (*wire_and_coils(spring), coil) for (name, spring), coil in each}
     for kind, factor, origin in (
         ("solid_height", limits.clearance_factor, "solid height + {} n (D + d), Grossi (2025)"),
         ("coil_clearance", limits.standard_clearance_factor, "the same with {}, EN 13906-1 static"),

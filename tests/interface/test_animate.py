@@ -15,9 +15,9 @@ from scipy.interpolate import CubicSpline
 
 import railsim
 from railsim.animation import mode_scene, result_scene, write_movie, write_page
-from railsim.animation.movie import _extent, _polygons, _seen, _shape, draw
+from railsim.animation.movie import _extent, _on_screen, _polygons, _shape, draw
 from railsim.animation.page import scene_data
-from railsim.animation.scene import Drawn, _drawn
+from railsim.animation.scene import DrawnBody, _bodies_to_draw
 from railsim.cli import main
 from railsim.cli.animate import _scene
 from railsim.definitions.vehicle.flatten import flatten
@@ -356,25 +356,27 @@ def test_a_film_looks_down_along_the_track_from_its_right():
     wanted = [(s, -down * c, level * c), (c, down * s, -level * s), (0.0, level, down)]
     for axis, (x, y, depth) in zip(np.eye(3), wanted, strict=True):
         for point, size in ((centre, 0.0), (centre + axis, 1.0)):
-            seen, far = _seen(point[None], np.zeros(4))
+            seen, far = _on_screen(point[None], np.zeros(4))
             np.testing.assert_allclose(seen, [[size * x, size * y]], atol=1e-15)
             assert far == pytest.approx(size * depth)
     # the view moves and turns with the track, whatever its cant
-    there, there_far = _seen(np.array([[3.0, 5.0, -1.4]]), np.array([3.0, 4.0, np.pi / 2.0, 0.1]))
+    there, there_far = _on_screen(
+        np.array([[3.0, 5.0, -1.4]]), np.array([3.0, 4.0, np.pi / 2.0, 0.1])
+    )
     np.testing.assert_allclose(there, [[s, -down * c]], atol=1e-15)
     assert there_far == pytest.approx(level * c)
 
 
 def test_bodies_of_a_film_have_their_sizes():
     """A wheelset has two rims and an axle 20 mm thick between them, a box six whole faces."""
-    rims = _shape(Drawn("w", "wheelset", 0.0, 0.0, 0.0, (0.46, 0.75, 0.0, 0.0, 0.0, 0.0)))
+    rims = _shape(DrawnBody("w", "wheelset", 0.0, 0.0, 0.0, (0.46, 0.75, 0.0, 0.0, 0.0, 0.0)))
     for rim, y in zip(rims, (-0.75, 0.75), strict=False):
         np.testing.assert_allclose(np.hypot(rim[:, 0], rim[:, 2]), 0.46)
         np.testing.assert_array_equal(rim[:, 1], y)
         steps = np.linalg.norm(np.diff(rim, axis=0), axis=1)  # all around, in 24 equal steps
         np.testing.assert_allclose(steps, 2.0 * 0.46 * np.sin(np.pi / 24.0))
     np.testing.assert_allclose(np.ptp(rims[2], axis=0), (0.0, 1.5, 0.02))
-    faces = _shape(Drawn("c", "car", 0.0, 0.0, 0.0, (3.0, 2.0, 1.0, 0.3, 0.2, 0.1)))
+    faces = _shape(DrawnBody("c", "car", 0.0, 0.0, 0.0, (3.0, 2.0, 1.0, 0.3, 0.2, 0.1)))
     middles = sorted(tuple(np.round(np.mean(face, axis=0), 9).tolist()) for face in faces)
     out = [np.array([0.3, 0.2, 0.1]) + sign * axis for axis in np.diag([3.0, 2.0, 1.0])
            for sign in (-1.0, 1.0)]  # fmt: skip
@@ -448,7 +450,7 @@ def test_boxes_are_drawn_about_the_centres_of_gravity_where_their_bodies_are():
     """Middle and half sizes, with the centre of gravity, give back the ends of each box."""
     vehicle = flatten(railsim.load_vehicle("coach_manchester"))
     boxes, reference = body_boxes(vehicle), vehicle.body(vehicle.reference)
-    drawn = {body.name: body for body in _drawn(vehicle)}
+    drawn = {body.name: body for body in _bodies_to_draw(vehicle)}
     assert len(boxes) == 3
     for name, (low, high) in boxes.items():
         half, middle = np.reshape(drawn[name].box, (2, 3))

@@ -553,6 +553,6 @@ def test_a_point_of_a_map_without_a_solution_is_named(monkeypatch):
         raise ModelError("no static equilibrium")
 
     monkeypatch.setattr(stability_map, "critical_speed", fails)
-    point = SimpleNamespace(at={"conicity": 0.2}, vehicle=None, track=None, settings=None)
+    point = SimpleNamespace(values={"conicity": 0.2}, vehicle=None, track=None, settings=None)
     (remark,) = stability_map.point_record(point, {})["remarks"]
     assert remark == "conicity 0.2: no static equilibrium"

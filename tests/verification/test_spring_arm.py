@@ -14,7 +14,7 @@ from railsim.springs import arm as trailing_arm
 from railsim.springs import helical
 from railsim.springs.arm import Arm, Coil
 from railsim.springs.design import design, design_task, target_load_range
-from railsim.springs.verification import load_cases, mounted, verify
+from railsim.springs.verification import load_cases, mounted_arm, verify
 
 NU = 0.3125
 
@@ -50,7 +50,7 @@ def work(arm, start, end):
     ],
 )
 def test_energy_form_stores_the_work_of_the_load(name, ends):
-    arm = mounted(load_spring(name, ["arm.equilibrium=energy"]))
+    arm = mounted_arm(load_spring(name, ["arm.equilibrium=energy"]))
     start, end = np.radians(ends)
     stored = trailing_arm.stored_energy(arm, end) - trailing_arm.stored_energy(arm, start)
     assert work(arm, start, end) == pytest.approx(float(stored), rel=1e-12)  # the quadrature's own
@@ -58,7 +58,7 @@ def test_energy_form_stores_the_work_of_the_load(name, ends):
 
 def test_settling_of_a_spring_that_joins_costs_less_than_a_thousandth():
     # the lateral energy of the inner spring appears while it settles, without work of the load
-    arm = mounted(load_spring("tare_laden_example"))
+    arm = mounted_arm(load_spring("tare_laden_example"))
     start, end = np.radians([-2.5, 2.0])
     stored = trailing_arm.stored_energy(arm, end) - trailing_arm.stored_energy(arm, start)
     assert work(arm, start, end) == pytest.approx(float(stored), rel=1e-3)
@@ -189,7 +189,7 @@ def reachable(suspension, deflection):
 
 
 def test_tare_and_laden_nest_follows_one_spring_then_two():
-    arm = mounted(load_spring("turasas_axlebox", ["inner.engagement=0.08"]))
+    arm = mounted_arm(load_spring("turasas_axlebox", ["inner.engagement=0.08"]))
     outer, inner = arm.coils
     # under the mounting load, arm horizontal: both springs, the inner one 80 mm behind
     assert outer.start - inner.start == pytest.approx(0.08, rel=1e-14)
@@ -203,7 +203,7 @@ def test_tare_and_laden_nest_follows_one_spring_then_two():
 
 @pytest.mark.parametrize("form", ["grossi", "energy"])
 def test_load_rises_steadily_where_the_inner_spring_starts_to_work(form):
-    arm = mounted(load_spring("tare_laden_example", [f"arm.equilibrium={form}"]))
+    arm = mounted_arm(load_spring("tare_laden_example", [f"arm.equilibrium={form}"]))
     inner = arm.coils[1]
     touch = float(trailing_arm.rotation_of_rise(arm.length, inner.seat, -inner.start))
     load = trailing_arm.load(arm, touch + np.linspace(-1e-2, 1e-2, 4001))

@@ -116,7 +116,7 @@ def test_coils_of_a_search_give_the_wanted_deflections(suspension):
     assert as_built.deflection_error == pytest.approx(0.0, abs=1e-10)
     for name, values in exact.slack.items():
         assert as_built.slack[name] == pytest.approx(values, rel=1e-7, abs=1e-9), name
-    heavy = replace(task, wanted=replace(task.wanted, target_load=2.0 * task.wanted.target_load))
+    heavy = replace(task, demand=replace(task.demand, target_load=2.0 * task.demand.target_load))
     broken = evaluate(heavy, x)
     assert broken.slack["stiffness"].tolist() == [-1.0] * len(NESTS)
     assert not broken.feasible.any()
@@ -130,7 +130,7 @@ def test_no_better_nest_lies_near_an_optimum(objective):
     task = nests.task_of(suspension)
     d = np.array([[0.041], [0.027]])
     begin = Dimensions(d, np.array([[0.226], [0.135]]), np.array([0.330]))
-    (found,) = search._abreast(task, [search._optimum(task, begin, 0)])
+    (found,) = search._run_together(task, [search._optimum(task, begin, 0)])
     assert found.worst > -1e-6
 
     def aim(seen):

@@ -116,7 +116,7 @@ def test_the_optimum_at_the_end_of_a_curved_edge_is_that_of_a_grid():
     found = nests.evaluate(task, tried)
     lightest = np.min(found.mass[found.feasible])
     start = nests.Dimensions(wires, np.array([[0.23028], [0.10509]]), np.array([0.33128]))
-    (end,) = springs_search._abreast(task, [springs_search._optimum(task, start, 0)])
+    (end,) = springs_search._run_together(task, [springs_search._optimum(task, start, 0)])
     assert end.worst >= -1e-6
     assert set(end.active) == {"yield_outer", "yield_inner", "buckling_inner"}
     # between the points of the grid it may be lighter by what a step is worth, 0.5 %
