@@ -130,11 +130,11 @@ def _curves(result: Result, rows: Floats) -> dict[str, Floats]:
         lateral = result["body_position"][:, [result.bodies.index(w) for w in result.wheelsets], 1]
     found = {"distance": np.repeat(result["distance"][rows[:-1]], 2)}
     for name, values in (("Q", result["Q"]), ("Y", result["Y"]), ("lateral", lateral[..., None])):
-        own = values[rows[0] : rows[-1]]
-        low, high = (extreme.reduceat(own, starts) for extreme in (np.fmin, np.fmax))
-        rising = own[ends] >= own[starts]
+        part = values[rows[0] : rows[-1]]
+        low, high = (extreme.reduceat(part, starts) for extreme in (np.fmin, np.fmax))
+        rising = part[ends] >= part[starts]
         pair = np.where(rising, low, high), np.where(rising, high, low)
-        found[name] = np.stack(pair, axis=1).reshape(-1, *own.shape[1:])
+        found[name] = np.stack(pair, axis=1).reshape(-1, *part.shape[1:])
     return found
 
 
@@ -167,11 +167,11 @@ def mode_scene(
     drawn = _bodies_to_draw(flat)
     names = [body.name for body in drawn]
     shape = np.zeros((len(drawn), 6), dtype=complex)
-    known = {body.name for body in flat.bodies}
+    body_names = {body.name for body in flat.bodies}
     for key, (real, imaginary) in mode["shape"].items():
         body, _, component = key.rpartition(".")
-        if body not in known or component not in COMPONENTS:
-            raise input_error("modes", "not of this vehicle", nearest(body, known), key)
+        if body not in body_names or component not in COMPONENTS:
+            raise input_error("modes", "not of this vehicle", nearest(body, body_names), key)
         if body not in names:
             continue
         row = names.index(body)
@@ -304,8 +304,8 @@ def contact_points(result: Result, rows: Floats, profiles: Profiles) -> Floats:
     rolling circles where the result does not have `contact_y` and `contact_z` [m].
     """
     found = np.zeros((len(rows), len(profiles), 2, 3))
-    known = all(name in result for name in ("contact_y", "contact_z", "wheelset_yaw"))
-    if known:
+    recorded = all(name in result for name in ("contact_y", "contact_z", "wheelset_yaw"))
+    if recorded:
         found[..., 1] = result["contact_y"][rows]
         found[..., 2] = result["contact_z"][rows]
         if "wheelset_roll" in result:
@@ -318,7 +318,7 @@ def contact_points(result: Result, rows: Floats, profiles: Profiles) -> Floats:
             y, z = section["wheel_y"], section["wheel_z"]
             order = np.argsort(y)
             y, z = y[order], z[order]
-            if known:
+            if recorded:
                 slope = np.interp(found[:, w, side, 1], y, np.gradient(z, y))
                 yaw = result["wheelset_yaw"][rows, w]
                 found[:, w, side, 0] = -(found[:, w, side, 2] * slope + found[:, w, side, 1]) * yaw

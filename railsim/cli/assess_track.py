@@ -54,8 +54,8 @@ def command(
     output.written += found.write()
     table, strip = found.table(), heat_strip(found.cells, found.shares, CELL)
     output.write("heat_strip.png", strip)
-    given = found.table(), found.share, strip, found.notes, found.sections
-    page = assessed_track_page(Path(recording).name, *given)
+    contents = found.table(), found.share, strip, found.notes, found.sections
+    page = assessed_track_page(Path(recording).name, *contents)
     output.write("report.html", page)
     more = len(table) - SHOWN
     table.rows = table.rows[:SHOWN]

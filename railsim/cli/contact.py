@@ -225,7 +225,7 @@ def _write_creep(output: cli.Output, patch: "Patch", rows: Sequence[dict[str, An
     from railsim.table import Column, Table
 
     creepages = {n: FIELD_SIZE * patch.unit_creepages(way) for n, way in CASES.items()}
-    fields = {case: exact_force(patch, given) for case, given in creepages.items()}
+    fields = {case: exact_force(patch, creepage) for case, creepage in creepages.items()}
     figures = (creep_curves_figure(patch, LAWS), traction_figure(fields, patch.mu * patch.N))
     columns = [Column(name, unit="1/m" if name == "phi" else "") for name in rows[0]]
     for name, content in zip(CREEP, (*figures, Table(columns, rows)), strict=True):

@@ -59,11 +59,11 @@ def remembered_interrupts(*, last: bool = False) -> Iterator[None]:
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                 before[number] = signal.signal(number, _hear)
     _heard.clear()
-    told = sys.unraisablehook
+    previous = sys.unraisablehook
 
     def tell(lost: "sys.UnraisableHookArgs") -> None:
         if not isinstance(lost.exc_value, Interrupted):
-            told(lost)
+            previous(lost)
 
     sys.unraisablehook = tell
     end_listening = _listening(set(before)) if before else None
@@ -73,7 +73,7 @@ def remembered_interrupts(*, last: bool = False) -> Iterator[None]:
         if not (last and _heard):
             if end_listening is not None:
                 end_listening()
-            sys.unraisablehook = told
+            sys.unraisablehook = previous
             for number, handler in before.items():
                 signal.signal(number, handler)
             _heard.clear()

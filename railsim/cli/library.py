@@ -27,14 +27,14 @@ def command(kinds: tuple[str, ...], draw: str | None, output: cli.Output) -> Non
     from railsim.description.library import KINDS, LAWS, MEANING, PROFILES, library_entries
     from railsim.table import Column, Table
 
-    known = [*KINDS, PROFILES, LAWS]
-    wrong = (kind for kind in kinds if kind not in known)
-    Faults(Fault("list", "", f"no kind '{one}'", nearest(one, known)) for one in wrong).check()
-    entries = [entry for kind in kinds or known for entry in library_entries(kind)]
+    allowed = [*KINDS, PROFILES, LAWS]
+    wrong = (kind for kind in kinds if kind not in allowed)
+    Faults(Fault("list", "", f"no kind '{one}'", nearest(one, allowed)) for one in wrong).check()
+    entries = [entry for kind in kinds or allowed for entry in library_entries(kind)]
     if draw is not None:
         _draw(entries, Path(draw), output)
     parts: list[str | Table] = []
-    for kind in kinds or known:
+    for kind in kinds or allowed:
         rows = [entry for entry in entries if entry["kind"] == kind]
         if not rows:
             parts += [f"{kind}: none", ""]

@@ -91,8 +91,8 @@ def command(
         if optimum is not None:
             from railsim.mechanisms.optimum import optimised_text
 
-            own = Path(files[0])
-            base = relative(own, output.out) if own.is_file() else files[0]
+            file_path = Path(files[0])
+            base = relative(file_path, output.out) if file_path.is_file() else files[0]
             content[OPTIMISED] = optimised_text(base, optimum, assignments, case).encode()
         output.write_all(content)
     output.answer(

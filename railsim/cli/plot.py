@@ -103,15 +103,15 @@ def _study_figure(
     ended = ("complete", "derailed", "stopped")
     gathered = gather([file])
     records = [record for record in gathered.records if record["status"] in ended]
-    known = columns(records)
-    if not known:
+    by_key = columns(records)
+    if not by_key:
         raise input_error(file, "no run has values", "a study with finished runs")
-    of_summary = {re.sub("_abs$", "_peak", name): name for name in known}  # its names there
-    of_summary |= {re.sub(r"_mid(?:1$|(\d+)$)", r"_median\1", name): name for name in known}
-    given = [of_summary.get(name, name) for name in selections]
-    names = given or [name for name in RANKED if name in known] or list(known)[:4]
-    wrong, found = (name for name in names if name not in known), "no such value in the study"
-    faults = Faults(Fault("QUANTITY", name, found, nearest(name, known)) for name in wrong)
+    of_summary = {re.sub("_abs$", "_peak", name): name for name in by_key}  # its names there
+    of_summary |= {re.sub(r"_mid(?:1$|(\d+)$)", r"_median\1", name): name for name in by_key}
+    requested = [of_summary.get(name, name) for name in selections]
+    names = requested or [name for name in RANKED if name in by_key] or list(by_key)[:4]
+    wrong, found = (name for name in names if name not in by_key), "no such value in the study"
+    faults = Faults(Fault("QUANTITY", name, found, nearest(name, by_key)) for name in wrong)
     first = gathered.results(list(gathered.paths)[:1])
     units = units_of(records, inputs_of(records, first) or used_inputs(folder_of(file)))
     varied = {name: _quantity(column) for name, column in parameters(records, units).items()}
@@ -121,7 +121,7 @@ def _study_figure(
         if name and name not in varied
     ]
     faults.check()
-    quantities = [_quantity(known[name]) for name in names]
+    quantities = [_quantity(by_key[name]) for name in names]
     # most values first, numbers before words; seeds last, which only name a random track
     seeds = [name for name in varied if name.rpartition(".")[2] == "seed"]
     order = sorted(
@@ -137,8 +137,8 @@ def _study_figure(
     early = [record["status"] != "complete" for record in records]
     if kind == "ranking" or x is None:
         ends = [f" ({record['status']})" * (record["status"] != "complete") for record in records]
-        named = [f"{record['name']}{end}" for record, end in zip(records, ends, strict=True)]
-        figure = ranking_figure(quantities, named)
+        labels = [f"{record['name']}{end}" for record, end in zip(records, ends, strict=True)]
+        figure = ranking_figure(quantities, labels)
     elif kind == "map":
         if not members:
             found = f"only '{x}' was varied"

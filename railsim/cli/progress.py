@@ -84,14 +84,14 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
     doing = logging.getLogger("railsim.doing")
     before, handler = doing.level, _Words(bar, words)
 
-    told = time.monotonic(), 0.0  # when a line was printed, and of how much
+    last = time.monotonic(), 0.0  # when a line was printed, and of how much
 
     def show(fraction: float) -> None:
-        nonlocal told
+        nonlocal last
         raise_pending_signal()
         bar.update(fraction - bar.n)
-        if bar.disable and fraction >= told[1] + 0.05 and time.monotonic() >= told[0] + BETWEEN:
-            told = time.monotonic(), fraction
+        if bar.disable and fraction >= last[1] + 0.05 and time.monotonic() >= last[0] + BETWEEN:
+            last = time.monotonic(), fraction
             echo(f"{getattr(bar, 'desc', words)}: {100.0 * fraction:.0f} %", err=True)
 
     doing.setLevel(logging.INFO)
@@ -170,8 +170,8 @@ class RunLines:
         texts = []
         peaks = [peak for record in records for peak in record.get("peaks", ())]
         for name, words in self.SHOWN:
-            own = (peak for peak in peaks if peak["quantity"] == name and peak["kind"] != "min")
-            if found := [peak["value"] for peak in own]:
+            hits = (peak for peak in peaks if peak["quantity"] == name and peak["kind"] != "min")
+            if found := [peak["value"] for peak in hits]:
                 quantity = QUANTITIES[name]
                 unit = "" if quantity.shown_unit == "-" else f" {quantity.shown_unit}"
                 texts.append(f"{words} {quantity.text(max(found, key=abs))}{unit}")

@@ -98,11 +98,11 @@ def design(suspension: "TrailingArmSuspension", search: bool) -> Answer:
 
         found = searched(suspension)
         data["search"] = search_data(found)
-        tried = (
+        sentence = (
             f"{found.tried} nests tried, {found.feasible} within all limits before refinement; "
             f"ranked by {found.objective}"
         )
-        parts += ["", tried, search_table(found)]
+        parts += ["", sentence, search_table(found)]
     return data, parts, found
 
 
@@ -131,8 +131,8 @@ def verify(suspension: "TrailingArmSuspension") -> Answer:
     data, sheets = verification_data(suspension, result), data_sheets(suspension, result)
     parts: list[Any] = [tables.load_table(suspension), ""] if suspension.load_notes else []
     deflections = f"{1e3 * data['mounting_deflection']:.2f} mm under the mounting load"
-    wanted = f"mounting.deflection is {1e3 * suspension.mounting.deflection:.2f} mm"
-    parts += [tables.case_table(result), f"{deflections}; {wanted}", ""]
+    target = f"mounting.deflection is {1e3 * suspension.mounting.deflection:.2f} mm"
+    parts += [tables.case_table(result), f"{deflections}; {target}", ""]
     parts += [tables.loaded_table(sheets), ""]
     parts += [tables.sheet_table(sheets), "", check_table(result.checks)]
     parts += [] if suspension.fatigue else [tables.NO_FATIGUE]

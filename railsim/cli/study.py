@@ -110,13 +110,13 @@ def command(
       railsim study curving_reference --out reference --report
       railsim study --scenario en14363 --vehicles coach_manchester --out campaign
     """
-    kept = {name: how.pop(name) for name in STORED}
-    asked = {name: how.pop(name) for name in OF_FILE if name != "settings"}
+    storage = {name: how.pop(name) for name in STORED}
+    values = {name: how.pop(name) for name in OF_FILE if name != "settings"}
     where = {name: how[name] for name in ("workers", "scheduler")}
     campaign: Callable[..., int] = partial(_campaign, report=report, **where)
     if scenario is not None:
         overrides = given.overrides
-        return campaign(scenario, asked["vehicles"], output, assignments=overrides, resume=resume)
+        return campaign(scenario, values["vehicles"], output, assignments=overrides, resume=resume)
     folder, base = Path(str(output.out)), Path.cwd()
     done = not output.overwrite and (folder / "study.json").exists()
     if not done and how["workers"] != 1 and how["scheduler"] is None:
@@ -126,7 +126,7 @@ def command(
     from railsim.studies.study import run_study, stored_spec
     from railsim.studies.user_function import function_to_resume
 
-    inputs = {**asked, "grid": _grid(asked["grid"]), "start": asked["start"] or 0.0}
+    inputs = {**values, "grid": _grid(values["grid"]), "start": values["start"] or 0.0}
     inputs |= {"assignments": given.overrides, "settings": given.settings}
     if resume and file is None and not any(inputs.values()):
         spec, base = stored_spec(folder)
@@ -135,14 +135,14 @@ def command(
         if spec.scenario is not None:
             resumed = {"assignments": tuple(spec.assignments), "resume": True}
             with chdir(base):
-                there = replace(output, out=str(folder))
-                return campaign(spec.scenario, spec.vehicles, there, **resumed)
+                resumed_output = replace(output, out=str(folder))
+                return campaign(spec.scenario, spec.vehicles, resumed_output, **resumed)
     else:
-        spec = _spec(file, inputs, quantities, kept, output)
+        spec = _spec(file, inputs, quantities, storage, output)
     lines = RunLines()
     # names of files in a study that goes on count from where it was started
-    own = faults_of_file(file, assignments=not given.overrides) if file else nullcontext()
-    with chdir(base), own, output.studying("study") as studying:
+    file_faults = faults_of_file(file, assignments=not given.overrides) if file else nullcontext()
+    with chdir(base), file_faults, output.studying("study") as studying:
         on_record = None if output.quiet or output.as_json else lines
         beside = ("report.html",) * report
         how |= {"resume": resume, "on_record": on_record, "further_files": beside, **studying}
@@ -236,12 +236,12 @@ def _spec(
         missing = [name for name in OF_FILE[:3] if not inputs[name]]
         words = "not given", "give one value at least"
         Faults(Fault(f"--{name}", "", *words) for name in missing).check()
-        named = {"quantities": full_name(quantities)}
-        return validated(StudySpec, {**storage, **inputs, **named}, "study")
+        function = {"quantities": full_name(quantities)}
+        return validated(StudySpec, {**storage, **inputs, **function}, "study")
     cli.refusals("given together with a study file", "the file holds it", *OF_FILE).check()
     study = load_study(file)
     if study.optimise is not None:
         output.remark("the table 'optimise' is not used here; `railsim optimise` varies its keys")
     assignments = [*study.assignments, *inputs["assignments"]]
-    named = {"quantities": full_name(quantities)}
-    return StudySpec.of_file(study, assignments=assignments, **named, **storage)
+    function = {"quantities": full_name(quantities)}
+    return StudySpec.of_file(study, assignments=assignments, **function, **storage)

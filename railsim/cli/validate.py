@@ -33,9 +33,9 @@ def command(files: tuple[str, ...], output: cli.Output) -> int:
         faults, kind, remarks = Faults(), "", list[Any]()
         with faults.caught():
             kind, remarks = check_one(file)
-        told = [asdict(fault) | {"text": str(fault)} for fault in faults]
-        said = [dict(vars(remark)) for remark in remarks]
-        reports.append({"file": file, "kind": kind or None, "faults": told, "remarks": said})
+        records = [asdict(fault) | {"text": str(fault)} for fault in faults]
+        notes = [dict(vars(remark)) for remark in remarks]
+        reports.append({"file": file, "kind": kind or None, "faults": records, "remarks": notes})
         if output.as_json:
             continue
         for line in fault_lines(faults):

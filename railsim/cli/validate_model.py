@@ -44,9 +44,9 @@ def command(
     names = [f for f in files if not (os.path.isdir(f) or Path(f).suffix.lower() in RESULTS)]
     if not names:
         raise input_error("MEASURED.toml", "none given", "a measurement file for each run")
-    runs, wanted = inputs(names, limits)  # before anything is simulated
+    runs, model_limits = inputs(names, limits)  # before anything is simulated
     results = _results(names, runs, [f for f in files if f not in names], vehicle)
-    found = validate_model(runs, results, limits=wanted)
+    found = validate_model(runs, results, limits=model_limits)
     if output.folder:
         from railsim.report.measured import measured_page, validation_figures, validation_part
 

@@ -143,19 +143,19 @@ class Analysis:
         Raises InputError: there is no such result, or it never has this value.
         """
         self.result(quantity)
-        dense, known = self._dense[0], self._dense[1][quantity]
-        low, high = np.nanmin(known), np.nanmax(known)
-        level = (known[1:] == value) & (known[:-1] == value)
+        dense, values = self._dense[0], self._dense[1][quantity]
+        low, high = np.nanmin(values), np.nanmax(values)
+        level = (values[1:] == value) & (values[:-1] == value)
         s = zeros(dense, lambda motion: outputs(motion)[quantity] - value)
         s = [x for x in s if x not in dense.s[1:][level]] or [self.model.start]
         results = outputs(solve(self.model, s))
         # where it jumps over the value it does not have it
         near = 1e-6 * max(high - low, abs(value))
-        there = np.flatnonzero(np.abs(results[quantity] - value) <= near)
-        if not len(there):
+        rows = np.flatnonzero(np.abs(results[quantity] - value) <= near)
+        if not len(rows):
             found, allowed = f"{value:g} is never reached", f"{low:.6g} to {high:.6g}"
             raise argument_error("at", found, allowed, key=quantity)
-        return [{name: float(array[k]) for name, array in results.items()} for k in there]
+        return [{name: float(array[k]) for name, array in results.items()} for k in rows]
 
 
 def either_way(result: Analysis, name: str) -> tuple[float, float]:
@@ -210,9 +210,9 @@ def _reactions(motion: Motion, dense: Motion) -> dict[str, Reaction]:
     definition, found = motion.model.definition, {}
     rows = _multipliers(motion)
     everywhere, whole = (rows, motion) if len(motion.s) >= DENSE else (_multipliers(dense), dense)
-    for name, known in everywhere.items():
+    for name, reaction in everywhere.items():
         # the second row of a prismatic joint is a torque
-        sized = known[:, :1] if hasattr(definition.joints[name], "prismatic") else known
+        sized = reaction[:, :1] if hasattr(definition.joints[name], "prismatic") else reaction
         size = np.sqrt(np.sum(sized**2, axis=1))
         k = int(np.argmax(size))
         found[name] = Reaction(float(size[k]), float(whole.s[k]), rows[name])

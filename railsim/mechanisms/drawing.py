@@ -146,16 +146,16 @@ def points(motion: Motion) -> dict[str, Floats]:
 
 def joint_points(motion: Motion) -> dict[str, str]:
     """The name under which each point is shown: points held together have one, by first point."""
-    shown: dict[str, str] = {}
-    known = points(motion)
+    labels: dict[str, str] = {}
+    by_name = points(motion)
     taken: list[tuple[Floats, str]] = []
     size = float(motion.model.linkage.size)
-    for name, xy in known.items():
+    for name, xy in by_name.items():
         same = [other for position, other in taken if np.max(np.abs(position - xy)) < 1e-9 * size]
-        shown[name] = same[0] if same else name
+        labels[name] = same[0] if same else name
         if not same:
             taken.append((xy, name))
-    return shown
+    return labels
 
 
 def working_box(motion: Motion) -> tuple[float, float, float, float]:

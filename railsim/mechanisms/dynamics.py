@@ -117,26 +117,26 @@ def driven_motion(whole: Motion) -> TimedMotion:
             return motion.q[:, k, 2], motion.q1[:, k, 2], motion.q2[:, k, 2]
         return motion.length(points_of(model.definition.actuators[law.actuator or ""]))
 
-    what, unit, scale = "length", "mm", 1e3
+    quantity, unit, scale = "length", "mm", 1e3
     if law.angle is not None:
-        what, unit, scale = "angle", "deg", float(np.degrees(1.0))
-    known, rate, _ = course(whole)
+        quantity, unit, scale = "angle", "deg", float(np.degrees(1.0))
+    values, rate, _ = course(whole)
     if len(turned := np.flatnonzero(rate * rate[0] <= 0.0)):
         at = driver_words(model, float(whole.s[turned[0]]))
-        found = f"driver at {at}: the {what} turns back there and cannot follow a law"
+        found = f"driver at {at}: the {quantity} turns back there and cannot follow a law"
         raise model.refusal("motion", found, "a range without a turning point")
-    first, last = known[[0, -1]]
+    first, last = values[[0, -1]]
     low, high = sorted((first, last))
     function, duration = law_of(model, law, float(last - first))
     time = np.linspace(0.0, duration, law.points)
     travel, speed, acceleration = function(time)
-    wanted = first + travel
+    targets = first + travel
     if law.law != "table":
-        wanted = np.clip(wanted, low, high)  # rounding at the ends
-    s = driver_at(whole, lambda motion: course(motion)[:2], wanted)
+        targets = np.clip(targets, low, high)  # rounding at the ends
+    s = driver_at(whole, lambda motion: course(motion)[:2], targets)
     if len(lost := np.flatnonzero(~np.isfinite(s))):
-        value = f"{wanted[lost[0]] * scale:.3f} {unit}"
-        found = f"at {time[lost[0]]:.4g} s the {what} would be {value}"
+        value = f"{targets[lost[0]] * scale:.3f} {unit}"
+        found = f"at {time[lost[0]]:.4g} s the {quantity} would be {value}"
         raise model.refusal("motion", found, f"{low * scale:.3f} to {high * scale:.3f} {unit}")
     motion = solve(model, s)
     _, slope, bend = course(motion)

@@ -115,8 +115,8 @@ class Judge:
             getattr(e, "friction", getattr(e, "moment", 0.0)) for e in definition.elements.values()
         ]
         self.rubs = any(size != 0.0 for size in sizes)
-        given = [n for n, text in definition.parameters.items() if not isinstance(text, str)]
-        self.fixed = {n: self.values[n] for n in given if n not in self.names}
+        numbers = [n for n, text in definition.parameters.items() if not isinstance(text, str)]
+        self.fixed = {n: self.values[n] for n in numbers if n not in self.names}
 
     def _check_length(self) -> None:
         """Refuse what needs the length of an actuator or an output where there is none."""

@@ -198,10 +198,10 @@ def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]
     index, begin, choice = job
     problem = _Problem(judge, choice)
     u = np.clip((begin - judge.lower) / problem.span, 0.0, 1.0)
-    named = judge.by_name(begin) | choice
+    values = judge.by_name(begin) | choice
     here = problem(u)
     if here is None:
-        return Start(index, named, named, np.nan, np.nan, problem.evaluations)
+        return Start(index, values, values, np.nan, np.nan, problem.evaluations)
     u, here = _rounds(problem, u, here, effort)
     violation = here.violation
     for left in reversed(range(effort.checks)):
@@ -216,7 +216,7 @@ def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]
             break
         u, here = _rounds(problem, u, judged, effort)
     end = judge.by_name(judge.lower + u * problem.span) | choice
-    return Start(index, named, end, here.objective, violation, problem.evaluations)
+    return Start(index, values, end, here.objective, violation, problem.evaluations)
 
 
 def _rounds(

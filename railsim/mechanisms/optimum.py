@@ -113,9 +113,9 @@ def optimum_of(
         limit, angles = after.model.number(angle), after.min_angles
         for name in breaches.keys() & angles.keys():  # margins are of the squares of their sines
             breaches[name] = max(limit - angles[name], 0.0)
-    kept, active = best.feasible and not breaches, _active(judge, judgement, x)
+    feasible, active = best.feasible and not breaches, _active(judge, judgement, x)
     values = judgement.objective, own, objective_before, kept_before
-    return Optimum(better, before, after, *values, kept, breaches, active, starts, seed)
+    return Optimum(better, before, after, *values, feasible, breaches, active, starts, seed)
 
 
 def _active(judge: Judge, judgement: Judgement, x: Floats) -> tuple[Active, ...]:

@@ -36,8 +36,8 @@ def length_points(definition: Mechanism) -> tuple[str, str] | None:
 
 def equal_lengths(dense: Motion, pair: tuple[str, str], edges: Any, count: int) -> Floats:
     """Values of the driver at equal steps of a length between two lengths."""
-    wanted = np.linspace(edges[0], edges[1], count)
-    return driver_at(dense, lambda motion: motion.length(pair)[:2], wanted)
+    lengths = np.linspace(edges[0], edges[1], count)
+    return driver_at(dense, lambda motion: motion.length(pair)[:2], lengths)
 
 
 def sampling_positions(dense: Motion) -> Floats:

@@ -36,11 +36,11 @@ def selection(result: Analysis) -> list[Choice]:
     definition = result.definition
     unknown = definition.held_by if definition.solve is not None else None
     found = [*_cylinders(result, unknown)] if isinstance(unknown, Cylinder) else []
-    for wanted in definition.selection:
-        element = definition.elements[wanted.element]
+    for request in definition.selection:
+        element = definition.elements[request.element]
         assert isinstance(element, GasSpring)
-        for row in definition.catalogues[wanted.catalogue]:
-            found.append(_gas_spring(result, wanted.element, element, wanted.catalogue, row))
+        for row in definition.catalogues[request.catalogue]:
+            found.append(_gas_spring(result, request.element, element, request.catalogue, row))
     return found
 
 

@@ -142,12 +142,12 @@ def _sections(ax: Axes, report: ZoneReport, looks: Mapping[str, Mapping[str, Any
     for name, look in looks.items():
         limits = {row.place: row.limit for row in report.rows if row.criterion.name == name}
         points = []
-        for own in report.values:
+        for part in report.values:
             shares = [
-                max(own.values[name, p]) / limits[p] for p in limits if (name, p) in own.values
+                max(part.values[name, p]) / limits[p] for p in limits if (name, p) in part.values
             ]
             if shares:
-                middle = 5e-4 * (own.section.begin + own.section.end)
+                middle = 5e-4 * (part.section.begin + part.section.end)
                 points.append((middle, 100.0 * max(shares)))
         if points:
             ax.plot(*zip(*points, strict=True), **look)
@@ -161,23 +161,23 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
     method that is nearest to its limit, of all populations.  None where there is none.
     """
     chosen = [{zone: row for zone in "234" if (row := _widest(a, zone))} for a in assessments]
-    zones = sorted({zone for own in chosen for zone in own})
+    zones = sorted({zone for rows in chosen for zone in rows})
     if not zones:
         return None
     names = list(dict.fromkeys(z.population.name for a in assessments for z in a.zones))
     height = 1.4 + 2.6 * len(assessments)
     figure, grid = _by_zone(assessments, zones, "cant deficiency (mm)", height)
-    for axes, assessment, own in zip(grid, assessments, chosen, strict=True):
+    for axes, assessment, rows in zip(grid, assessments, chosen, strict=True):
         for ax, zone in zip(axes, zones, strict=True):
-            if zone not in own:
+            if zone not in rows:
                 ax.set_axis_off()
                 ax.set_title("", loc="right")
                 continue
             for report in assessment.zones:
                 if report.zone == zone:
                     colour = distinct(names.index(report.population.name))
-                    _regression(ax, report, own[zone], colour)
-            row = own[zone]
+                    _regression(ax, report, rows[zone], colour)
+            row = rows[zone]
             ax.axhline(row.criterion.scale * row.limit, color=LIMIT, lw=1.0)
             unit = row.criterion.unit.replace("-", "1")
             ax.set_ylabel(f"{row.criterion.words},\n{row.place} ({unit})", fontsize=8)
@@ -202,8 +202,8 @@ def _widest(assessment: Assessment, zone: str) -> Assessed | None:
 def _regression(ax: Axes, report: ZoneReport, like: Assessed, colour: str) -> None:
     """Draw the values of one quantity at one place in one population."""
     own, scale = (like.criterion.name, like.place), like.criterion.scale
-    there = [v for v in report.values if own in v.values]
-    points = [(1e3 * v.section.cant_deficiency, scale * max(v.values[own])) for v in there]
+    sections = [v for v in report.values if own in v.values]
+    points = [(1e3 * v.section.cant_deficiency, scale * max(v.values[own])) for v in sections]
     if points:
         ax.plot(*zip(*points, strict=True), "o", color=colour, ms=3.5)
     row = next((r for r in report.rows if (r.criterion.name, r.place) == own), None)

@@ -75,9 +75,9 @@ def _draw_pair(axes: Axes, geometry: ContactGeometry, pair: Pair, side: int) -> 
     order = np.argsort(pair.wheel.y, kind="stable")
     heights = np.interp(on_wheel, pair.wheel.y[order], pair.wheel.z[order])
     known = np.isfinite(on_wheel)
-    wanted = np.arange(np.ceil(1e3 * geometry.lateral[0]), 1e3 * geometry.lateral[-1] + 1e-6)
+    lines = np.arange(np.ceil(1e3 * geometry.lateral[0]), 1e3 * geometry.lateral[-1] + 1e-6)
     last_label = np.inf
-    for millimetres in wanted:
+    for millimetres in lines:
         i = int(np.argmin(np.abs(1e3 * geometry.lateral - millimetres)))
         if not known[i]:
             continue

@@ -125,11 +125,11 @@ def _split_hands(radius: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 def _plan(axes: Axes, curving: Curving) -> None:
     """Wheelsets on the unrolled track in the tightest curve, seen from above."""
-    there = curving.converged[:, 0, 0] > 0
-    if not there.any():
+    converged = curving.converged[:, 0, 0] > 0
+    if not converged.any():
         say(axes, "no values at any radius for the first deficiency and friction")
         return
-    r = int(np.argmin(np.where(there, np.abs(curving.radius), np.inf)))
+    r = int(np.argmin(np.where(converged, np.abs(curving.radius), np.inf)))
     x = np.array(curving.wheelset_position)
     for y in (-HALF, HALF):
         axes.axhline(y, color="0.75", lw=2.5, zorder=1)

@@ -82,10 +82,10 @@ def _window(horizontal: Floats, between: tuple[float, float]) -> slice:
 def _by_wheelset(result: Result, panel: Panel) -> list[Panel | None]:
     if not any("wheelset" in line.labels for line in panel.lines):
         return [panel]
-    own: dict[str, list[Line]] = {name: [] for name in result.wheelsets}
+    lists: dict[str, list[Line]] = {name: [] for name in result.wheelsets}
     for line in panel.lines:
-        own[line.labels["wheelset"]].append(line)
-    return [Panel(panel.quantity, tuple(lines)) if lines else None for lines in own.values()]
+        lists[line.labels["wheelset"]].append(line)
+    return [Panel(panel.quantity, tuple(lines)) if lines else None for lines in lists.values()]
 
 
 def _figure(

@@ -35,9 +35,9 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
     values = np.array(locus.values)
     eigenvalues = locus.eigenvalues
     with np.errstate(invalid="ignore"):
-        there = np.abs(eigenvalues) < 2.0 * np.pi * SHOWN  # false where there is no mode
+        shown = np.abs(eigenvalues) < 2.0 * np.pi * SHOWN  # false where there is no mode
     # at two values at least (of several)
-    chosen = np.flatnonzero(there.sum(axis=0) >= min(2, len(there))).tolist()
+    chosen = np.flatnonzero(shown.sum(axis=0) >= min(2, len(shown))).tolist()
     if not chosen:
         say(plane, f"no oscillation below {SHOWN:g} Hz")
         return figure

@@ -35,8 +35,8 @@ def irregularity_figure(irregularity: Irregularity) -> Figure:
     axes[SHOWN - 1].set_xlabel("s (m)")
     for piece in irregularity.pieces:
         for q, ls in enumerate(("-", "--", ":")):
-            there = piece.power[q] > 0.0
-            wavelength, seen = 2.0 * np.pi / piece.wave_numbers[there], piece.seen[q, there]
+            positive = piece.power[q] > 0.0
+            wavelength, seen = 2.0 * np.pi / piece.wave_numbers[positive], piece.seen[q, positive]
             words = QUANTITIES[q].replace("_", " ") if piece is irregularity.pieces[0] else None
             axes[SHOWN].plot(wavelength, seen, color=f"C{q}", ls=ls, lw=0.9, label=words)
     axes[SHOWN].axhline(0.5, color="0.5", lw=0.8, ls="--")

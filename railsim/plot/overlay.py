@@ -119,12 +119,12 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
     title = f"Leading wheelset: difference from {unformatted(first)}"
     figure, cells, _ = _cells(len(names), 1.5, "distance (m)", title)
     for axes, name in zip(cells, names, strict=True):
-        own = [one for one in found if one.quantity.name == name]
-        for one in own:
+        differences = [one for one in found if one.quantity.name == name]
+        for one in differences:
             colour = style.distinct(1 + labels.index(one.result))
             line = style.SIDE_LINES[one.labels.get("side", "left")]
             axes.plot(one.distance, one.values * one.quantity.scale, color=colour, ls=line)
-        frame(axes, own[0].quantity, capitalised(own[0].quantity))
+        frame(axes, differences[0].quantity, capitalised(differences[0].quantity))
     _legend(figure, labels, {one.labels.get("side") for one in found}, 1)
     return figure
 

@@ -44,8 +44,8 @@ class Column:
     @property
     def different(self) -> list[Any]:
         """Its values, each once, sorted."""
-        there = {value for value in self.values if value is not None}
-        return sorted(there, key=lambda value: (isinstance(value, str), value))
+        present = {value for value in self.values if value is not None}
+        return sorted(present, key=lambda value: (isinstance(value, str), value))
 
     def text(self, value: float, digits: int) -> str:
         """Return a number with so many digits, none beyond those of tables: 1570, 38.0, 0.00."""
@@ -76,8 +76,8 @@ def curves_figure(
     _name_medians(figure, points, "; bands from the smallest to the largest")
     for axes, quantity in zip(cells, quantities, strict=True):
         for member, colour in zip(members, colours, strict=True):
-            own = [value == member for value in others]
-            _curve(axes, quantity, x, own, colour, member)
+            mask = [value == member for value in others]
+            _curve(axes, quantity, x, mask, colour, member)
         for value, abscissa, crossed in zip(quantity.values, x.values, early, strict=False):
             if crossed and None not in (value, abscissa):
                 place = abscissa if x.numeric else x.different.index(abscissa)
@@ -109,20 +109,20 @@ def say_above(figure: Figure, text: str) -> None:
 
 def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, member: Any) -> None:
     different = x.different
-    there: dict[int, list[float]] = {}
+    groups: dict[int, list[float]] = {}
     for i, (value, abscissa) in enumerate(zip(quantity.values, x.values, strict=True)):
         if value is not None and abscissa is not None and mask[i]:
-            there.setdefault(different.index(abscissa), []).append(value)
-    if not there:
+            groups.setdefault(different.index(abscissa), []).append(value)
+    if not groups:
         return
-    order = sorted(there)
+    order = sorted(groups)
     at = [different[k] if x.numeric else k for k in order]
-    middle = [float(np.median(there[k])) for k in order]
+    middle = [float(np.median(groups[k])) for k in order]
     label = None if member is None else unformatted(_text(member))
     line = "-" if x.numeric else ""  # categories have no order
     axes.plot(at, middle, "o", ls=line, color=colour, ms=3.5, label=label)
-    if max(map(len, there.values())) > 1:
-        low, high = [min(there[k]) for k in order], [max(there[k]) for k in order]
+    if max(map(len, groups.values())) > 1:
+        low, high = [min(groups[k]) for k in order], [max(groups[k]) for k in order]
         if len(at) > 1 and x.numeric:
             axes.fill_between(at, low, high, color=colour, alpha=0.15, lw=0)
         else:
@@ -141,13 +141,13 @@ def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
     columns, rows = x.different, y.different
     scattered = x.numeric and y.numeric and 2 * len(set(points)) < len(columns) * len(rows)
     for axes, quantity in zip(cells, quantities, strict=True):
-        there: dict[tuple[int, int], list[float]] = {}
+        groups: dict[tuple[int, int], list[float]] = {}
         for triple in zip(quantity.values, x.values, y.values, strict=True):
             if None not in triple:
                 value, a, b = triple
-                there.setdefault((rows.index(b), columns.index(a)), []).append(value)
+                groups.setdefault((rows.index(b), columns.index(a)), []).append(value)
         values = np.full((len(rows), len(columns)), np.nan)
-        for cell, found in there.items():
+        for cell, found in groups.items():
             values[cell] = float(np.median(found))
         axes.set(title=quantity.words, xlabel=x.words, ylabel=y.words)
         if scattered:

@@ -64,15 +64,15 @@ def _assumed(runs: Sequence[Inputs], whole: str) -> Table:
     """Return the assumptions of runs; those that are the same in all, once, under `whole`."""
     columns: dict[str, dict[str, dict[str, None]]] = {}
     for one in runs:
-        own = columns.setdefault(f"{one.vehicle_label} on {one.track_label}", {})
+        texts = columns.setdefault(f"{one.vehicle_label} on {one.track_label}", {})
         for line in assumptions(one.vehicle, one.track, one.settings, one.speed)[1:]:
             key, words = line.split(None, 1)
-            own.setdefault(key, {})[words] = None
-    if all(own == next(iter(columns.values())) for own in columns.values()):
+            texts.setdefault(key, {})[words] = None
+    if all(texts == next(iter(columns.values())) for texts in columns.values()):
         columns = {whole: next(iter(columns.values()))}
-    keys = dict.fromkeys(key for own in columns.values() for key in own)
+    keys = dict.fromkeys(key for texts in columns.values() for key in texts)
     shown, more = dict(list(columns.items())[:MOST_ASSUMED]), len(columns) - MOST_ASSUMED
-    rows = [[key, *(_either(list(own.get(key, ()))) for own in shown.values())] for key in keys]
+    rows = [[key, *(_either(list(texts.get(key, ()))) for texts in shown.values())] for key in keys]
     header, note = ["", *map(printable, shown)], f"{more} more vehicles on tracks." * (more > 0)
     return Table(header, rows, "Assumptions", range(len(shown) + 1), note=note)
 

@@ -295,15 +295,15 @@ def _zones(assessments: Sequence[Assessment]) -> list[Table]:
         rows: list[list[Cell]] = []
         failed = []
         for rule in rules:
-            own = [reports.get(rule) for reports in worst.values()]
-            first = next(pair for pair in own if pair)[1]
-            limits = dict.fromkeys(_limit(pair[1]) for pair in own if pair)
-            if any(pair and pair[1].exceeded for pair in own):
+            pairs = [reports.get(rule) for reports in worst.values()]
+            first = next(pair for pair in pairs if pair)[1]
+            limits = dict.fromkeys(_limit(pair[1]) for pair in pairs if pair)
+            if any(pair and pair[1].exceeded for pair in pairs):
                 failed.append(len(rows))
             words = first.criterion.words, first.criterion.meaning
             values, sources = zip(*limits, strict=True)
             limit = " / ".join(values), " / ".join(dict.fromkeys(sources))
-            rows.append([words, *map(_cell, own), limit])
+            rows.append([words, *map(_cell, pairs), limit])
         own_zones = [z for one in assessments for z in one.zones if z.zone == name]
         counts = sorted({len(zone.values) for zone in own_zones})
         number = " to ".join(dict.fromkeys(str(n) for n in (counts[0], counts[-1])))

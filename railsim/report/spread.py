@@ -214,8 +214,8 @@ def worst_runs(records: Sequence[Record], most: int) -> list[str]:
     names = [str(record["name"]) for record in records]
     if len(names) <= most:
         return names
-    there = columns(records)
-    ranked = [largest_first(there[name]["values"]) for name in RANKED if name in there]
+    by_key = columns(records)
+    ranked = [largest_first(by_key[name]["values"]) for name in RANKED if name in by_key]
     in_turn = dict.fromkeys(number for rank in zip_longest(*ranked) for number in rank)
     in_turn.pop(None, None)
     return [names[number] for number in sorted([*in_turn][:most] or range(most))]

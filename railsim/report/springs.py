@@ -154,10 +154,10 @@ def page(results: PageResults, figures: Mapping[str, bytes]) -> str:
         sections.append(Section("Design", [text], designed, drawings("coils")))
     cases = [tables.load_table(suspension), tables.case_table(verification)]
     listed = [tables.sheet_table(sheets), tables.loaded_table(sheets)]
-    told = [] if suspension.fatigue else [tables.NO_FATIGUE]
+    no_fatigue = [] if suspension.fatigue else [tables.NO_FATIGUE]
     sections += [
         Section("Load cases", [], cases, drawings("stiffness", "deflection", "arm")),
-        Section("Checks", told, [check_table(verification.checks, notes=True)]),
+        Section("Checks", no_fatigue, [check_table(verification.checks, notes=True)]),
         Section("Data sheets of the springs", [SHEETS], listed),
     ]
     if results.fatigue is not None:

@@ -197,11 +197,11 @@ def _negative_faults(
     )
     yield Fault(suspension.name, "target.load", found, allowed)
     shortest = min(coil.H0 for coil in frame.coils)
-    tried = np.linspace(suspension.engagement + 1e-6, 0.6 * shortest, 4001)
-    wanted_too = replace(demand, target_deflection=tried)
+    deflections = np.linspace(suspension.engagement + 1e-6, 0.6 * shortest, 4001)
+    wanted_too = replace(demand, target_deflection=deflections)
     low, high = target_load_range(frame, suspension.engagement, wanted_too)
-    turned = np.abs(tried - demand.mounting_deflection) > 1e-5
-    fitting = tried[(low < demand.target_load) & (demand.target_load < high) & turned]
+    turned = np.abs(deflections - demand.mounting_deflection) > 1e-5
+    fitting = deflections[(low < demand.target_load) & (demand.target_load < high) & turned]
     if fitting.size:
         verb = "raise" if demand.target_deflection < fitting[0] else "reduce"
         ends = f"{fitting[0] * 1e3:.2f} and {fitting[-1] * 1e3:.2f} mm"

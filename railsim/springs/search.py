@@ -192,8 +192,8 @@ def _leaders(task: Task, sample: Dimensions, merit: Floats) -> tuple[Dimensions,
     reach = np.array([0.1, 0.1, 0.5]) * np.array([widest, widest, longest - shortest])
     for turn in range(_ROUNDS):
         if turn % 2 == 0:  # leave the worse half of the pairs, as long as enough are left
-            kept = np.argsort(merit, kind="stable")[: max(len(merit) // 2, 4 * _SPARE)]
-            x, d, merit = x[kept], d[kept], merit[kept]
+            best_rows = np.argsort(merit, kind="stable")[: max(len(merit) // 2, 4 * _SPARE)]
+            x, d, merit = x[best_rows], d[best_rows], merit[best_rows]
         tried = x[:, None, :] + reach * random.uniform(-1.0, 1.0, (len(x), _AROUND, 3))
         tried[..., 2] = np.clip(tried[..., 2], shortest, longest)
         *D, H0 = tried.reshape(-1, 3).T
@@ -273,10 +273,10 @@ def _optimum(task: Task, sample: Dimensions, start: int) -> Steps[_Optimum]:
         if gain < _CONVERGED or reach < _CONVERGED:
             break
         there = yield from linearise(x + step)
-        kept = (here.merit - there.merit) / gain
-        if kept > 0.1:
+        ratio = (here.merit - there.merit) / gain
+        if ratio > 0.1:
             x, here = x + step, there
-        reach = 1.5 * reach if kept > 0.7 else 0.35 * float(np.max(np.abs(step)))
+        reach = 1.5 * reach if ratio > 0.7 else 0.35 * float(np.max(np.abs(step)))
     slack = dict(zip(here.names, here.slack.tolist(), strict=True))
     return _Optimum(dimensions_at(x[None, :]), slack)
 
@@ -385,5 +385,5 @@ def _nothing_fits(
     names = sorted(missed, key=lambda name: -missed[name])[:3]
     for name in names:
         if missed[name] > 0.5 * missed[names[0]]:
-            said = f"no nest fits: the limit '{name}' {words.format(missed[name])}"
-            yield Fault(suspension.name, LIMITS[name][0], said, LIMITS[name][1])
+            sentence = f"no nest fits: the limit '{name}' {words.format(missed[name])}"
+            yield Fault(suspension.name, LIMITS[name][0], sentence, LIMITS[name][1])

@@ -148,8 +148,8 @@ def loaded_table(sheets: Mapping[str, Sheet]) -> Table:
     rows = []
     for load in next(iter(sheets.values())).loads:
         for name, sheet in sheets.items():
-            own = sheet.loads[load]
-            rows.append({"load case": load, "spring": name, **vars(own), **own.lateral})
+            state = sheet.loads[load]
+            rows.append({"load case": load, "spring": name, **vars(state), **state.lateral})
     return Table(columns, rows)
 
 

@@ -68,7 +68,7 @@ class Place:
     vehicle: str
     speed: float  # [m/s]
     quantity: str  # of `QUANTITIES`
-    of_status: str  # wheel, wheelset or point
+    where: str  # wheel, wheelset or point
     s: float  # of that wheelset or point [m]
     value: float  # [SI]
     limit: float  # [SI]
@@ -117,14 +117,14 @@ class TrackAssessment:
                    Column("value", format=".2f"),
                    Column("share", "of the limit", "", ".2f"),
                    "shape"]  # fmt: skip
-        own = any(p.mileage is not None for p in self.places)
-        columns += [Column("mileage", unit="km", format=".3f")] * own
+        with_mileage = any(p.mileage is not None for p in self.places)
+        columns += [Column("mileage", unit="km", format=".3f")] * with_mileage
         rows = []
         for p in self.places:
             shown = QUANTITIES[p.quantity]
             value = Amount(p.value, shown, with_unit=True)
-            rows.append([p.vehicle, p.speed, p.s, shown.name, p.of_status, value, p.value / p.limit,
-                         p.shape, *[p.mileage] * own])  # fmt: skip
+            rows.append([p.vehicle, p.speed, p.s, shown.name, p.where, value, p.value / p.limit,
+                         p.shape, *[p.mileage] * with_mileage])  # fmt: skip
         return Table(columns, rows)
 
     def _with_units(self) -> Table:
@@ -427,11 +427,11 @@ def _peaks(s: Floats, part: Floats, share: float) -> list[int]:
 
 def _strongest(places: Sequence[Place]) -> list[Place]:
     """Of places of one vehicle, speed and quantity that lie together, the one furthest beyond."""
-    kept: list[Place] = []
-    known: dict[tuple[str, float, str], list[float]] = {}
+    strongest: list[Place] = []
+    by_quantity: dict[tuple[str, float, str], list[float]] = {}
     for place in sorted(places, key=lambda p: -p.value / p.limit):
-        others = known.setdefault((place.vehicle, place.speed, place.quantity), [])
+        others = by_quantity.setdefault((place.vehicle, place.speed, place.quantity), [])
         if all(abs(place.s - s) > APART for s in others):
             others.append(place.s)
-            kept.append(place)
-    return kept
+            strongest.append(place)
+    return strongest

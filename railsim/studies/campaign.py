@@ -390,10 +390,10 @@ def to_target(
     if not sections or target is None:
         return track
     quality = TrackQuality(track, sections[0].begin, sections[-1].end)
-    found = np.percentile([quality.deviations(s.begin, s.end) for s in sections], SHARE, axis=0)
-    wanted = np.array(target.middle(min(sections[0].speed, service.admissible_speed)))
+    values = np.percentile([quality.deviations(s.begin, s.end) for s in sections], SHARE, axis=0)
+    goal = np.array(target.middle(min(sections[0].speed, service.admissible_speed)))
     parts = tuple(
         part.model_copy(update={"channels": channels, "scale": round(float(scale), 4)})
-        for channels, scale in zip((LATERAL, VERTICAL), part.scale * wanted / found, strict=True)
+        for channels, scale in zip((LATERAL, VERTICAL), part.scale * goal / values, strict=True)
     )
     return track.model_copy(update={"irregularities": parts})

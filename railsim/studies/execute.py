@@ -56,7 +56,7 @@ class Job:
     keep: tuple[str, ...] = EVERYTHING
     storage: Storage = PLAIN  # compression and precision of its file
     # of a run that exists, whose analyses alone are to be computed: what is known of it
-    known: Record | None = None
+    record: Record | None = None
 
     @property
     def whole(self) -> bool:
@@ -73,9 +73,9 @@ def perform(job: Job, progress: Progress | None = None) -> Record:
     case = job.case
     if not case.file_name:
         return _analysis_record(job)
-    if job.known is not None:
+    if job.record is not None:
         with suppress(RailsimError):  # its file lacks required quantities: it is run again
-            return finished_record(case, open_result(job.path), job.function, job.known)
+            return finished_record(case, open_result(job.path), job.function, job.record)
     # the quantities that records and files need
     wants_all = job.function or case.analyses or job.picture
     only = EVERYTHING if wants_all else {*OF_FACTS, *ALWAYS_KEPT, *job.keep}

@@ -168,8 +168,8 @@ class Plan:
         base = self._base(kind, path)
         if not base:
             return ""
-        named = [self._content(name) for text in overrides for name in _named_files(text)]
-        return _hash([base, *overrides, *named])
+        contents = [self._content(name) for text in overrides for name in _named_files(text)]
+        return _hash([base, *overrides, *contents])
 
     def _of_file(self, kind: str, path: str | Path | None) -> str:
         if path is None:

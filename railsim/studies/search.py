@@ -137,8 +137,8 @@ class _Gain:
         from scipy.stats import qmc
 
         both = np.vstack([front, predicted])
-        shown = both[non_dominated(both)]
-        low, high = shown.min(axis=0), shown.max(axis=0)
+        best = both[non_dominated(both)]
+        low, high = best.min(axis=0), best.max(axis=0)
         span = np.where(high > low, high - low, np.maximum(np.abs(high), 1e-12))
         unit = qmc.Sobol(both.shape[1], seed=rng).random(CELLS)
         self._points = low + unit * (1.0 + MARGIN) * span
@@ -218,20 +218,20 @@ def _nsga2(task: Task) -> None:
     algorithm = NSGA2(pop_size=task.batch)
     algorithm.setup(problem, termination=NoTermination(), seed=task.seed)
     for _ in range(max(1, task.number // task.batch)):
-        asked = algorithm.ask()
-        if asked is None or not len(asked):
+        population = algorithm.ask()
+        if population is None or not len(population):
             return
-        values = task.evaluate(asked.get("X"))
-        asked.set("F", _without_nan(values.objectives)[-len(asked) :])
+        values = task.evaluate(population.get("X"))
+        population.set("F", _without_nan(values.objectives)[-len(population) :])
         if task.constraints:
-            asked.set("G", _without_nan(values.constraints)[-len(asked) :])
-        algorithm.tell(infills=asked)
+            population.set("G", _without_nan(values.constraints)[-len(population) :])
+        algorithm.tell(infills=population)
 
 
 def _without_nan(values: Floats) -> Floats:
     """Return values in which designs without values are worse than all others."""
-    known = np.where(np.isnan(values), -np.inf, values)
-    worst = np.where(np.isfinite(known).any(axis=0), known.max(axis=0), 0.0)
+    comparable = np.where(np.isnan(values), -np.inf, values)
+    worst = np.where(np.isfinite(comparable).any(axis=0), comparable.max(axis=0), 0.0)
     return np.where(np.isnan(values), worst + np.abs(worst) + 1.0, values)
 
 
@@ -245,14 +245,14 @@ def _differential_evolution(task: Task) -> None:
     def worth(designs: Any) -> Any:
         values = task.evaluate(designs.T)
         number = designs.shape[1]
-        found, broken = values.objectives[-number:, 0], values.constraints[-number:]
+        value, broken = values.objectives[-number:, 0], values.constraints[-number:]
         if not scale:
-            scale.append(float(np.max(np.abs(found), where=~np.isnan(found), initial=0.0)) or 1.0)
+            scale.append(float(np.max(np.abs(value), where=~np.isnan(value), initial=0.0)) or 1.0)
         # infeasible designs are worse than all feasible ones of any generation (Deb 2000)
         excess = np.maximum(broken, 0.0).sum(axis=1)
-        below_one = found / (scale[0] + np.abs(found))
-        known = np.where(excess > 0.0, 1.0 + excess, below_one)
-        return np.where(np.isnan(found) | np.isnan(excess), NO_ANSWER, known)
+        below_one = value / (scale[0] + np.abs(value))
+        penalised = np.where(excess > 0.0, 1.0 + excess, below_one)
+        return np.where(np.isnan(value) | np.isnan(excess), NO_ANSWER, penalised)
 
     differential_evolution(
         worth,
@@ -292,13 +292,13 @@ def non_dominated(values: Floats) -> Flags:
     >>> non_dominated(np.array([[1.0, 3.0 + 1e-12], [2.0, 3.0]])).tolist()
     [True, False]
     """
-    known = np.logical_not(np.isnan(values).any(axis=1))
-    values = np.where(varies(values[known]), values, 0.0)
+    valued = np.logical_not(np.isnan(values).any(axis=1))
+    values = np.where(varies(values[valued]), values, 0.0)
     found = np.zeros(len(values), dtype=np.bool_)
     front = np.empty((0, values.shape[1]))
     for i in np.lexsort(values.T[::-1]):  # a row can only be dominated by rows before it
         row = values[i]
-        if known[i] and not (front <= row).all(axis=1).any():
+        if valued[i] and not (front <= row).all(axis=1).any():
             found[i] = True
             front = np.vstack([front, row])
     return found

@@ -114,8 +114,8 @@ def map_speeds(records: Sequence[Record]) -> dict[str, np.ndarray]:
     """Return the critical speeds of a map by method in words, NaN where there is none [m/s]."""
     first = next((record for record in records if "linearisation" in record), {})
     # of those that failed too, which say only where they are
-    own = [record.get("conicity") or record.get("at", {}).get("conicity") for record in records]
-    cones = {conicity for conicity in own if conicity}
+    conicities = [r.get("conicity") or r.get("at", {}).get("conicity") for r in records]
+    cones = {conicity for conicity in conicities if conicity}
     kind, amplitude = first.get("linearisation", "tangent"), first.get("amplitude") or AMPLITUDE
     contact = Contact(kind, amplitude, cones.pop() if len(cones) == 1 else None)
     kinds = {"linear": f"linear, {contact.words()}"}
@@ -138,7 +138,7 @@ def map_table(records: Sequence[Record], parameters: Mapping[str, str]) -> Table
     columns = [Column(name, unit=unit, format="g") for name, unit in parameters.items()]
     columns += [Column(words, unit="m/s", format=".2f") for words in speeds]
     of_point = zip(records, *speeds.values(), strict=True)
-    rows = [[*(record["at"][name] for name in parameters), *own] for record, *own in of_point]
+    rows = [[*(record["at"][name] for name in parameters), *cells] for record, *cells in of_point]
     missing = [_without_linear(record) for record in records]
     if any(missing):
         columns.append(Column("linear", " "))

@@ -160,7 +160,7 @@ def test_exception_becomes_an_exit_status(error, status, monkeypatch, capsys):
     def failing(*_):
         raise error
 
-    monkeypatch.setattr("railsim.cli.validate.checked", failing)
+    monkeypatch.setattr("railsim.cli.validate.check_one", failing)
     assert cli.main(["validate", "x"]) == status
     assert "Traceback" not in capsys.readouterr().err
 
@@ -169,7 +169,7 @@ def test_unforeseen_exception_is_one_line_with_a_report(monkeypatch, capsys):
     def failing(*_):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("railsim.cli.validate.checked", failing)
+    monkeypatch.setattr("railsim.cli.validate.check_one", failing)
     assert cli.main(["validate", "x"]) == 1
     assert "unexpected ZeroDivisionError" in capsys.readouterr().err
 
