@@ -56,12 +56,12 @@ def command(
     from railsim.assessment.record import RUNNING
     from railsim.assessment.running import OF_LIMITS, by_vehicle
     from railsim.assessment.tables import assessment_lines
-    from railsim.studies.gathered import open_results, without_file
+    from railsim.studies.gathered import open_results, runs_without_file
 
     results = open_results(_paths(files))
     for file in files:
         try:
-            missing = without_file(Path(file))
+            missing = runs_without_file(Path(file))
         except (InputError, OSError) as error:
             output.remark(f"runs without a result file are not named: {error}")
         else:
@@ -102,13 +102,13 @@ def _service(results: "dict[str, Result]", options: dict[str, Any]) -> "Service 
     from railsim.definitions.vehicle.tables import Service
     from railsim.studies.spec import validated
 
-    def of_option(fault: Fault) -> Fault:
+    def option_fault(fault: Fault) -> Fault:
         found = f"found {changes.get(fault.key, 'nothing')}"
         option = f"--{fault.key.replace('_', '-')}"
         return Fault(option, "", found, f"{fault.allowed}, in SI units")
 
     service = common_service(results, changes)
-    with changed_faults(of_option):
+    with changed_faults(option_fault):
         return validated(Service, {**(service.model_dump() if service else {}), **changes}, "")
 
 

@@ -124,7 +124,7 @@ def _groups(files: tuple[str, ...], output: cli.Output) -> dict[str, Group]:
     if len(folders) < len(files):
         found = f"results and folders together ({folders[0]})"
         raise input_error("R.h5|STUDY", found, "results, or folders of studies")
-    groups = _of_one(folders[0]) if len(folders) == 1 else _of_several(folders, output)
+    groups = _in_folder(folders[0]) if len(folders) == 1 else _in_folders(folders, output)
     crowded = [title for title, group in groups.items() if len(group) > MOST]
     if crowded:
         found = f"{len(groups[crowded[0]])} results side by side"
@@ -132,7 +132,7 @@ def _groups(files: tuple[str, ...], output: cli.Output) -> dict[str, Group]:
     return groups if len(groups) > 1 else {"": next(iter(groups.values()))}
 
 
-def _of_one(folder: str) -> dict[str, Group]:
+def _in_folder(folder: str) -> dict[str, Group]:
     """Return the runs of a folder that differ in nothing but the vehicle."""
     from railsim.studies.gathered import gather
 
@@ -151,7 +151,7 @@ def _of_one(folder: str) -> dict[str, Group]:
     return pairs
 
 
-def _of_several(folders: list[str], output: cli.Output) -> dict[str, Group]:
+def _in_folders(folders: list[str], output: cli.Output) -> dict[str, Group]:
     """Return the runs of the same name in several folders."""
     from railsim.studies.gathered import gather
 

@@ -84,7 +84,7 @@ def command(
             hits = ((words, results[-1].everywhere(name, value)) for words, name, value in queries)
             at_values.append([{"where": words, **one} for words, rows in hits for one in rows])
             if len(results) == 1 and mechanism.cases and case is None and not searched:
-                cases = {name: _of_case(mechanism, name) for name in mechanism.cases}
+                cases = {name: _analyse_case(mechanism, name) for name in mechanism.cases}
                 cases = {"base": results[0], **cases}
     if output.out is not None:
         content = written(PageResults(results, cases, optimum))
@@ -102,7 +102,7 @@ def command(
     )
 
 
-def _of_case(mechanism: "Mechanism", case: str) -> "Analysis":
+def _analyse_case(mechanism: "Mechanism", case: str) -> "Analysis":
     """Results of a case that was not asked for; what is wrong with it names it."""
     from railsim.mechanisms.analysis import analyse
 

@@ -74,7 +74,7 @@ def command(
     with output.progress("modes"):
         found: Modes | RootLocus
         if over is not None:
-            found = _over(given, over, speed, how)
+            found = _locus_over(given, over, speed, how)
         elif speeds is not None:
             found = root_locus(coach, rails, settings=settings, speeds=speeds, **how)
         else:
@@ -107,7 +107,7 @@ def _animate(vehicle: "Vehicle", modes: "Modes", name: str | None, page: Path) -
     return [write_page(scene, page, modes=list(scenes.values()), overwrite=True)]
 
 
-def _over(given: cli.Given, over: str, speed: float, how: dict[str, Any]) -> "RootLocus":
+def _locus_over(given: cli.Given, over: str, speed: float, how: dict[str, Any]) -> "RootLocus":
     from railsim.definitions.units_of_keys import unit_of_input
     from railsim.linear.modes import parameter_locus
     from railsim.linear.vehicle import Contact, LinearVehicle, smooth_law

@@ -54,7 +54,7 @@ def command(
     from railsim.result.extremes import run_facts
     from railsim.result.tables import result_parts
     from railsim.simulation.assumptions import assumptions
-    from railsim.studies.case import of_settings, run_case
+    from railsim.studies.case import run_case, settings_fault
 
     keep_freed_memory()
     resume = _open_for_continuation(before) if before else None
@@ -67,7 +67,7 @@ def command(
     quiet, overwrite = output.quiet, output.overwrite
     if not (quiet or output.as_json):
         show(*assumptions(case.vehicle, case.track, case.settings, case.speed))
-    found = changed_faults(lambda fault: of_settings(fault, spec))
+    found = changed_faults(lambda fault: settings_fault(fault, spec))
     with output.progress(case.name) as progress, found:
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
     record: dict[str, Any] = {"file": str(path)}

@@ -105,7 +105,7 @@ class Unit:
         # whoever loads a unit executes its code: the wrapper is Python too
         self._simulation = Simulation(**inputs, record=False, allow_code=True)
         self._command()
-        self._look()
+        self._read_outputs()
 
     def do_step(self, current_time: float, step_size: float) -> Any:
         """Advance by a step of communication."""
@@ -130,7 +130,7 @@ class Unit:
             self.log(str(fault), status.error)
             return outcome(status.error)
         goes_on = run.step(step_size)
-        self._look()
+        self._read_outputs()
         if not goes_on:
             ended = status.ok if self._status == "complete" else status.warning
             self.log(f"the run has ended: {self._status}, {run.status_reason}", ended)
@@ -153,7 +153,7 @@ class Unit:
         for name, value in self._commands.items():
             self._run.set(name, value)
 
-    def _look(self) -> None:
+    def _read_outputs(self) -> None:
         """Read the outputs."""
         run = self._run
         self._time, self._status = self._begin + run.time, run.status

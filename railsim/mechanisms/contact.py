@@ -73,7 +73,7 @@ def rests(dense: Motion, force: Force) -> tuple[Rest, ...]:
     model = dense.model
     if not np.any(force(dense, 0)):
         return ()
-    if forces.rubs(model):
+    if forces.frictional(model):
         return tuple(_rest_ranges(dense, force))
     span = model.end - model.start
     low, high = sorted((model.start, model.end))

@@ -10,7 +10,7 @@ from railsim.arrays import Floats
 from railsim.definitions.mechanism import definition as written
 from railsim.definitions.mechanism.values import points_of
 from railsim.errors import InputError
-from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, inertia, rubs
+from railsim.mechanisms.forces import Rates, actuator_force, frictional, generalised_force, inertia
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, driver_words, solve
 from railsim.mechanisms.links import Course
@@ -92,7 +92,7 @@ def law_of(model: Model, law: written.Motion, stroke: float) -> tuple[Law, float
     return constant, stroke / speed
 
 
-def driving(definition: written.Mechanism) -> str:
+def driving_actuator(definition: written.Mechanism) -> str:
     """Name of the actuator whose force makes the motion of the file's motion law."""
     law, solve_for = definition.motion, definition.solve
     assert law is not None
@@ -144,7 +144,7 @@ def driven_motion(whole: Motion) -> TimedMotion:
     s2 = (acceleration - bend * s1**2) / slope
     resting = np.abs(s1) <= 1e-12 * np.max(np.abs(s1))  # but for rounding
     sense = np.where(resting, model.sense, np.sign(s1))  # a table may go back
-    force = actuator_force(motion, driving(model.definition), Rates(s1, s2, sense))
+    force = actuator_force(motion, driving_actuator(model.definition), Rates(s1, s2, sense))
     return TimedMotion(time, motion, s1, s2, force)
 
 
@@ -205,7 +205,7 @@ def free_motion(
 
     reaches_end.terminal = True  # type: ignore[attr-defined]
     turns.terminal = True  # type: ignore[attr-defined]
-    events = [reaches_end, turns] if rubs(model) else [reaches_end]
+    events = [reaches_end, turns] if frictional(model) else [reaches_end]
     accuracy: Any = {"rtol": ACCURACY, "atol": 1e-13}
     t, state, legs, reached = 0.0, np.array([start, speed]), [], False
     while t < duration and not reached:

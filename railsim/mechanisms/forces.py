@@ -265,7 +265,7 @@ def _loads(motion: Motion, rates: Rates) -> Iterator[Load]:
         yield from element_loads(motion, name, element, rates)
 
 
-def rubs(model: Model) -> bool:
+def frictional(model: Model) -> bool:
     """Whether any element has friction, so that the way back needs another force."""
     elements = model.definition.elements.values()
     sizes = [part.moment for part in elements if isinstance(part, parts.JointFriction)]

@@ -71,7 +71,7 @@ class Judgement:
         return float(max(0.0, np.max(breach(self.margins, self.firm), initial=0.0)))
 
 
-def firm(name: str) -> bool:
+def is_firm(name: str) -> bool:
     """Whether a mechanism that breaks a constraint cannot move at all."""
     return name != "max_stroke" and name.endswith(("dead_point", "_stroke"))
 
@@ -222,7 +222,7 @@ class Judge:
         return Judgement(
             np.real(residuals)[0], derivative(residuals).T, float(sizes[k]), rivals[k],
             np.real(margins)[0], derivative(margins).T, rivals[sizes >= (1.0 - RIVAL) * sizes[k]],
-            np.array([firm(name) for name, _ in self.labels], dtype=bool),
+            np.array([is_firm(name) for name, _ in self.labels], dtype=bool),
         )  # fmt: skip
 
     def _at_height(

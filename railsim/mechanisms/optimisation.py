@@ -21,7 +21,7 @@ from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.values import number
 from railsim.errors import Fault, InputError, argument_error, argument_fault
 from railsim.mechanisms.forces import unit_work
-from railsim.mechanisms.judgement import FEASIBLE, Judge, Judgement, breach, firm
+from railsim.mechanisms.judgement import FEASIBLE, Judge, Judgement, breach, is_firm
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.optimum import Optimum, Start, best_of, optimum_of
 from railsim.processes import WorkerPool
@@ -187,7 +187,7 @@ def _between(
     judge: Judge, x: Floats, choice: dict[str, float], known_breach: float = 0.0
 ) -> tuple[float, list[float]]:
     """Largest breach of a constraint at any position, and where it is larger than a known one."""
-    breaches = [(firm(name), *least) for name, least in judge.least(x, choice).items()]
+    breaches = [(is_firm(name), *least) for name, least in judge.least(x, choice).items()]
     most = max((float(breach(margin, fixed)) for fixed, margin, _ in breaches), default=0.0)
     allowed = [0.1 * FEASIBLE + (not fixed) * known_breach for fixed, _, _ in breaches]
     return most, [s for (_, m, s), limit in zip(breaches, allowed, strict=True) if -m > limit]

@@ -96,7 +96,7 @@ def _forces(motion: Motion, unknown: str) -> dict[str, Any]:
     model = motion.model
     definition = model.definition
     results: dict[str, Any] = {}
-    for way, sense in (("", 1), ("_back", -1))[: 2 if forces.rubs(model) else 1]:
+    for way, sense in (("", 1), ("_back", -1))[: 2 if forces.frictional(model) else 1]:
         rates = forces.Rates(friction=sense * model.sense)
         results[f"force{way}"] = forces.actuator_force(motion, unknown, rates)
     if isinstance(definition.actuators[unknown], Cylinder | AirSpring):

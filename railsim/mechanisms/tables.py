@@ -13,7 +13,7 @@ from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import compare
 from railsim.mechanisms.contact import Contact, is_loaded
-from railsim.mechanisms.dynamics import NEAR, driving
+from railsim.mechanisms.dynamics import NEAR, driving_actuator
 from railsim.mechanisms.kinematics import folded
 from railsim.mechanisms.quantities import force_unit, force_units, quantity
 from railsim.mechanisms.selection import Choice, selection
@@ -152,7 +152,7 @@ def sentences(result: Analysis) -> list[str]:
     if result.contact is not None:
         found += _contact_sentences(result.contact)
     if (timed := result.timed) is not None:
-        drives = driving(result.definition)
+        drives = driving_actuator(result.definition)
         unit = force_unit(drives, result.definition)
         low, high = f"{np.min(timed.force):.2f}", f"{np.max(timed.force):.2f} {unit}"
         first = f"force of '{drives}' {timed.force[0]:.2f} {unit} at first"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIGURES = {
-    "Assessment": ("assessment", "one_figure"), "Curving": ("curving", "curving_figure"),
+    "Assessment": ("assessment", "single_figure"), "Curving": ("curving", "curving_figure"),
     "CriticalSpeed": ("stability", "bifurcation_figure"),
     "Modes": ("modes", "modes_figure"), "Result": ("histories", "histories"),
     "RootLocus": ("modes", "locus_figure"), "Track": ("track", "track_figure"),

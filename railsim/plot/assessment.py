@@ -38,7 +38,7 @@ def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
     return None
 
 
-def one_figure(assessment: Assessment) -> Figure:
+def single_figure(assessment: Assessment) -> Figure:
     """Draw one assessment; raises InputError where nothing is to draw."""
     figure = assessment_figure([assessment])
     if figure is None:
@@ -235,9 +235,9 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
         colour = distinct(number)
         runs.sort(key=lambda run: run[0])
         label = unformatted(", ".join(words)) or "middle of the car"
-        _over_speed(mean, runs, lambda p: p.mean.N_MV, "-", color=colour, label=label)
+        _draw_over_speed(mean, runs, lambda p: p.mean.N_MV, "-", color=colour, label=label)
         for way, line in (("lateral", "-"), ("vertical", "--")):
-            _over_speed(index, runs, lambda p, way=way: p.sperling[way], line, color=colour)  # type: ignore[misc]
+            _draw_over_speed(index, runs, lambda p, way=way: p.sperling[way], line, color=colour)  # type: ignore[misc]
     for ax in (mean, index):
         ax.set_ylim(bottom=0.0)
     _classes(mean, assessments)
@@ -274,7 +274,7 @@ Runs = Sequence[tuple[float, Sequence[PointComfort]]]
 """Speeds with the comfort at every measuring point."""
 
 
-def _over_speed(
+def _draw_over_speed(
     axes: Axes, runs: Runs, value: Callable[[PointComfort], float], line: str, **look: Any
 ) -> None:
     speeds = [speed for speed, _ in runs]

@@ -19,7 +19,7 @@ from railsim.definitions.mechanism.parts import AirSpring, Cam
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.cams import cam_rows, on_one_arc, roller_body
 from railsim.mechanisms.drawing import Line, centres, joint_points, lines, points, working_box
-from railsim.mechanisms.dynamics import driving
+from railsim.mechanisms.dynamics import driving_actuator
 from railsim.mechanisms.forces import table_of
 from railsim.mechanisms.kinematics import Motion, folded, solve
 from railsim.mechanisms.links import Course, actuators, links
@@ -71,7 +71,7 @@ def mark_zone(axes: Axes, result: Analysis, over: str) -> None:
     axes.axvline(work, color="0.5", lw=0.8, ls=(0, (4, 2)), zorder=1)
 
 
-def way(result: Analysis) -> str:
+def travel_name(result: Analysis) -> str:
     """Name of the result that says how far the output has moved along its axis."""
     return "x" if result.model.axis == 0 else "height"
 
@@ -274,7 +274,7 @@ def cam_figure(result: Analysis) -> Figure:
 @style.styled()
 def force_figure(result: Analysis) -> Figure:
     """Ratios and force of the actuator over its length and over the height, or over the driver."""
-    over = [name for name in ("length", way(result)) if name in result.output] or ["travel"]
+    over = [name for name in ("length", travel_name(result)) if name in result.output] or ["travel"]
     rows = {
         "ratio": [("ratio", "along y"), ("ratio_x", "along x")],
         "force": [("force", "on the way"), ("force_back", "on the way back")],
@@ -301,7 +301,7 @@ def pressure_figure(result: Analysis) -> Figure:
     lines = [(values_of(n, result), label) for n, label in names if n in result.output]
     if result.contact is not None:
         lines.append((np.full(len(lines[0][0]), result.contact.pressure / 1e6), "held"))
-    over = "length" if result.definition.output is None else way(result)
+    over = "length" if result.definition.output is None else travel_name(result)
     curves(axes, result, over, lines, "pressure (MPa)")
     axes.set_ylim(bottom=0.0)
     return figure
@@ -316,7 +316,7 @@ def contact_figure(result: Analysis) -> Figure:
     lines = [(contact.curve, f"at {contact.pressure / 1e6:.4f} MPa")]
     if contact.rising != contact.falling:
         lines += zip(contact.bounds, ("rising", "falling"), strict=True)
-    curves(axes, result, way(result), lines, "static contact force (N)")
+    curves(axes, result, travel_name(result), lines, "static contact force (N)")
     axes.axhline(0.0, color="0.4", lw=0.8)
     for y, stable in contact.equilibria:
         axes.plot(y * 1e3, 0.0, "o", mfc="k" if stable else "w", color="k", ms=6, clip_on=False)
@@ -366,7 +366,7 @@ def time_figure(result: Analysis) -> Figure:
     (a, b), (c, d) = figure.subplots(2, 2, sharex=True)
     a.plot(timed.time, timed.motion.s * quantity("travel", result.definition).scale, color=MAIN)
     a.set_ylabel(label_of("travel", result, "driver"))
-    name = driving(result.definition)
+    name = driving_actuator(result.definition)
     unit = force_unit(name, result.definition)
     b.plot(timed.time, timed.force, color=MAIN)
     b.set_ylabel(f"{'torque' if unit == 'N m' else 'force'} of '{name}' ({unit})")
@@ -416,8 +416,8 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
                 above = curve[1] - np.interp(curve[0], *base)
                 panels[1, column].plot(curve[0], above, **line_style(i))
         if not zoom:
-            mark_zone(panels[0, column], first, way(first))
-        panels[-1, column].set_xlabel(label_of(way(first), first))
+            mark_zone(panels[0, column], first, travel_name(first))
+        panels[-1, column].set_xlabel(label_of(travel_name(first), first))
     panels[0, 0].set_ylabel("ratio dy/dL")
     unit = force_units(one.definition for one in results.values())
     panels[0, 1].set_ylabel(f"force ({unit})")
@@ -436,7 +436,7 @@ def held_figure(results: Mapping[str, Analysis]) -> Figure:
     for i, (label, result) in enumerate(results.items()):
         if "pressure" not in result.output or "height" not in result.output:
             continue
-        height = values_of(way(result), result)
+        height = values_of(travel_name(result), result)
         left.plot(height, values_of("pressure", result), label=label, **line_style(i))
         if result.contact is not None:
             held = f"{label}, {result.contact.pressure / 1e6:.4f} MPa"
@@ -444,8 +444,8 @@ def held_figure(results: Mapping[str, Analysis]) -> Figure:
     right.axhline(0.0, color="0.4", lw=0.8)
     first = next(iter(results.values()))
     for axes, text in ((left, "pressure needed (MPa)"), (right, "static contact force (N)")):
-        mark_zone(axes, first, way(first))
-        axes.set(xlabel=label_of(way(first), first), ylabel=text)
+        mark_zone(axes, first, travel_name(first))
+        axes.set(xlabel=label_of(travel_name(first), first), ylabel=text)
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize=7.5)
     left.set_ylim(bottom=0.0)
@@ -456,9 +456,9 @@ def _over_height(result: Analysis, name: str, zoom: bool) -> tuple[Floats, Float
     """A result over the height, with `zoom` in the zone only; None where there is none."""
     if name not in result.output or "height" not in result.output:
         return None
-    x, y = values_of(way(result), result), values_of(name, result)
+    x, y = values_of(travel_name(result), result), values_of(name, result)
     if zoom and result.zone:
-        low, high = (result.zone[k][way(result)] * 1e3 for k in ("low", "high"))
+        low, high = (result.zone[k][travel_name(result)] * 1e3 for k in ("low", "high"))
         inside = (x >= low) & (x <= high)
         x, y = x[inside], y[inside]
     return x, y

@@ -29,7 +29,7 @@ def name_points(axes: Axes, points: Mapping[str, Floats], lines: Sequence[Floats
     per_point = figure.dpi / 72.0
     frame = np.array(axes.get_window_extent().extents) / per_point
     places = {name: axes.transData.transform(xy) / per_point for name, xy in points.items()}
-    ink = np.concatenate([_along(axes.transData.transform(xy) / per_point) for xy in lines])
+    ink = np.concatenate([_points_along(axes.transData.transform(xy) / per_point) for xy in lines])
     marks = np.array(list(places.values()))
     boxes: list[Floats] = []
     for name, point in places.items():
@@ -44,7 +44,7 @@ def name_points(axes: Axes, points: Mapping[str, Floats], lines: Sequence[Floats
         note(axes, name, points[name], offset, "center", "center", **look).set_in_layout(False)
 
 
-def _along(line: Floats) -> Floats:
+def _points_along(line: Floats) -> Floats:
     """Points of a line, 3 points of print apart."""
     parts = [line[:1]]
     for a, b in pairwise(line):

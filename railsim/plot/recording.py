@@ -57,7 +57,7 @@ def recording_figure(before: Floats, after: Floats, title: str) -> Figure:
     return figure
 
 
-def _even(rows: Floats, channel: Callable[[Floats], Floats]) -> tuple[Floats, float]:
+def _even_values(rows: Floats, channel: Callable[[Floats], Floats]) -> tuple[Floats, float]:
     """Values at equal steps, and the step [m]."""
     step = float(np.mean(np.diff(rows[:, 0])))
     s = rows[0, 0] + step * np.arange(len(rows))
@@ -65,7 +65,7 @@ def _even(rows: Floats, channel: Callable[[Floats], Floats]) -> tuple[Floats, fl
 
 
 def _deviations(rows: Floats, channel: Callable[[Floats], Floats]) -> str:
-    values, step = _even(rows, channel)
+    values, step = _even_values(rows, channel)
     parts = []
     for name in ("D1", "D2"):
         if step * len(values) > 3.0 * BANDS[name][1] and 2.0 * step < BANDS[name][0]:
@@ -77,7 +77,7 @@ def _deviations(rows: Floats, channel: Callable[[Floats], Floats]) -> str:
 def _spectrum(
     axes: Axes, rows: Floats, channel: Callable[[Floats], Floats], look: dict[str, object]
 ) -> None:
-    values, step = _even(rows, channel)
+    values, step = _even_values(rows, channel)
     size = max(8, min(round(LONGEST / step), 2 * len(values) // (SEGMENTS + 1)))
     if len(values) < size:
         return

@@ -341,7 +341,7 @@ def wear_figure(
     """
     figure = Picture(8.6, 7.6, title)
     outline, depth, conicity = figure.subplots(3, 1, height_ratios=[1.0, 1.2, 0.8])
-    _worn(outline, depth, wheels, 1e-3, "km")
+    _draw_wear(outline, depth, wheels, 1e-3, "km")
     depth.set_xlim(1e3 * PROFILE[0], 1e3 * PROFILE[1])
     depth.set(xlabel="y from the nominal rolling circle, flange negative (mm)")
     values = [row["equivalent_conicity"] for row in rows]
@@ -363,13 +363,13 @@ def rail_wear_figure(rails: Mapping[str, Sequence[tuple[float, "Profile"]]], tit
     figure = Picture(9.8, 5.6, title)
     axes = figure.subplots(2, 2, height_ratios=[1.0, 1.2], sharey="row")
     for (outline, depth), (side, steps) in zip(axes.T, rails.items(), strict=True):
-        _worn(outline, depth, steps, 1e-9, "Mt")
+        _draw_wear(outline, depth, steps, 1e-9, "Mt")
         outline.set_title(f"{side} rail")
         depth.set(xlabel="y from the middle of the rail, gauge side negative (mm)")
     return figure
 
 
-def _worn(
+def _draw_wear(
     outline: Axes, depth: Axes, steps: Sequence[tuple[float, "Profile"]], scale: float, unit: str
 ) -> None:
     """Draw the new and the last profile, and the depth of wear after each step, in a unit."""

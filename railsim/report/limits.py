@@ -235,8 +235,8 @@ def _setup(one: Assessment, runs: Results) -> Table:
         rows.append(("approved for", f"{3.6 * service.admissible_speed:.0f} km/h, cant deficiency "
                      f"{1e3 * service.cant_deficiency:.0f} mm, {service.category}"))  # fmt: skip
     rows += [
-        (f"measuring point {name}", f"on {s.body}, {_off(s.along, 'ahead of', 'behind')} the "
-         f"reference body's origin, {_off(-s.arm[2], 'above', 'below')} that of its body")
+        (f"measuring point {name}", f"on {s.body}, {_offset(s.along, 'ahead of', 'behind')} the "
+         f"reference body's origin, {_offset(-s.arm[2], 'above', 'below')} that of its body")
         for name, s in sensors(vehicle).items()
     ]  # fmt: skip
     rows.append(("wheel forces", "Y and Q of every wheel, in the contact"))
@@ -251,7 +251,7 @@ def _setup(one: Assessment, runs: Results) -> Table:
     return Table(["", ""], [[*row] for row in rows], caption, (0, 1))
 
 
-def _off(distance: float, on: str, back: str) -> str:
+def _offset(distance: float, on: str, back: str) -> str:
     return f"{abs(distance):.2f} m {on if distance >= 0.0 else back}"
 
 

@@ -18,7 +18,7 @@ from railsim.design_checks import check_table
 from railsim.mechanisms import drawing, tables
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
-from railsim.mechanisms.dynamics import driving
+from railsim.mechanisms.dynamics import driving_actuator
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.quantities import force_unit, quantity
@@ -171,7 +171,7 @@ def motion_table(result: Analysis) -> bytes:
     timed = result.timed
     assert timed is not None
     unit = quantity("travel", result.definition).si_unit
-    force = f"force [{force_unit(driving(result.definition), result.definition)}]"
+    force = f"force [{force_unit(driving_actuator(result.definition), result.definition)}]"
     columns = {"time [s]": timed.time, f"travel [{unit}]": timed.motion.s, force: timed.force}
     for courses, value, of in _courses(timed.motion):
         rates = f"{value} speed [{of}/s]", f"{value} acceleration [{of}/s2]"

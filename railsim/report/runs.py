@@ -68,13 +68,13 @@ def page(
     data: dict[str, Any] = {"curves": [group for group in curves if group["quantities"]]}
     every = results if assessable is None else assessable
     verdicts, limits = assess_runs(every)
-    peaks = any(record["name"] in results for record in _done(records))
+    peaks = any(record["name"] in results for record in _with_values(records))
     run_inputs = inputs_of(records, every) or list(run_inputs)
     units = units_of(records, run_inputs[:MOST_UNITS])
     few, analysed = len(records) < spread.LEAST, any(one.get("quantities") for one in records)
     sections = [_peaks(records, results)] if peaks or (few and not analysed) else []
     sections += [_assessment_section(one) for one in assessments if one.standard not in RUNNING]
-    if len(_done(records)) > max(spread.LEAST, len(results)):
+    if len(_with_values(records)) > max(spread.LEAST, len(results)):
         sections.append(_worst(records, units))
     if found and (data["curves"] or peaks):
         sections.append(_curves(len(data["curves"]), records, results))
@@ -98,7 +98,7 @@ def page(
     )  # fmt: skip
 
 
-def _done(records: Sequence[Record]) -> list[Record]:
+def _with_values(records: Sequence[Record]) -> list[Record]:
     return [record for record in records if record.get("peaks") or record.get("quantities")]
 
 
@@ -145,7 +145,7 @@ def _verdict(
 
 def _peaks(records: Sequence[Record], results: Results) -> doc.Section:
     """Peaks of the shown runs side by side, with position and time."""
-    shown = [record for record in _done(records) if record["name"] in results]
+    shown = [record for record in _with_values(records) if record["name"] in results]
     rows: dict[tuple[str, str], list[doc.Cell]] = {}
     for number, record in enumerate(shown):
         wheelsets = results[record["name"]].wheelsets
@@ -167,7 +167,7 @@ def _peaks(records: Sequence[Record], results: Results) -> doc.Section:
     kinds = {(True, True): "steps", (False, False): "outputs"}
     mixed = "outputs, and over all steps where a result holds these,"
     instants = kinds.get((any(of_steps), all(of_steps)), mixed)
-    texts, done = [PEAKS.format(instants=instants)], len(_done(records))
+    texts, done = [PEAKS.format(instants=instants)], len(_with_values(records))
     if not done:
         texts = ["No run has values; why stands under the failures below."]
     elif not shown:
@@ -179,7 +179,7 @@ def _peaks(records: Sequence[Record], results: Results) -> doc.Section:
 
 def _worst(records: Sequence[Record], units: Mapping[str, str]) -> doc.Section:
     """The runs with the largest values, and where the study has them."""
-    done = _done(records)
+    done = _with_values(records)
     header = ["", *(f"{k}." for k in range(1, spread.WORST + 1))]
     table = doc.Table(header, spread.worst_rows(done, units))
     text = (
@@ -216,7 +216,7 @@ def _curves(number: int, records: Sequence[Record], results: Results) -> doc.Sec
     if not number:
         text = "The results hold none of the quantities that are drawn here."
         return doc.Section("Along the track", [text], id="curves")
-    done = len(_done(records))
+    done = len(_with_values(records))
     texts = [f"{_largest(len(results), done)}."] if len(results) < done else []
     return doc.Section("Along the track", texts, plots=[*map(str, range(number))], id="curves")
 
@@ -228,7 +228,7 @@ def _spread(
     units: Mapping[str, str],
 ) -> doc.Section:
     """Table of all runs, and what their values depend on."""
-    done, varied = _done(records), spread.parameters(records, units)
+    done, varied = _with_values(records), spread.parameters(records, units)
     data["spread"] = {
         "parameters": varied,
         "columns": spread.columns(records),

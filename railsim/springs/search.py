@@ -124,7 +124,7 @@ def search(suspension: TrailingArmSuspension) -> SearchResult:
         cloud=np.column_stack([found.mass, np.minimum(*found.margin)])[feasible],
     )  # fmt: skip
     if not nests:
-        raise InputError(_nothing_fits(suspension, result, optima))
+        raise InputError(_no_nest_faults(suspension, result, optima))
     return result
 
 
@@ -364,7 +364,7 @@ def _round_nest(task: Task, optimum: _Optimum, around: Floats) -> Steps[tuple[fl
     )  # fmt: skip
 
 
-def _nothing_fits(
+def _no_nest_faults(
     suspension: TrailingArmSuspension, result: SearchResult, optima: Sequence[_Optimum]
 ) -> Iterator[Fault]:
     """The limits that the least broken nest breaks; without one, those that most candidates do."""

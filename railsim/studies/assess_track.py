@@ -209,7 +209,7 @@ def assess_track(
     outputs["quantities"] = quantities
     settings = Settings(output_rate=RATE, outputs=outputs)
     runs: list[_Run] = []
-    behind = {name: _behind(vehicle) for name, vehicle in tested.items()}
+    behind = {name: _length_behind(vehicle) for name, vehicle in tested.items()}
     for number, (a, b) in enumerate(pairwise(edges.tolist())):
         part, moved = _part(track, a, b + max(behind.values()) + RUN_OUT * max(speeds))
         for name, vehicle in tested.items():
@@ -263,7 +263,7 @@ def load_recorded_track(recording: str | Path) -> Track:
     return track
 
 
-def _behind(vehicle: Vehicle) -> float:
+def _length_behind(vehicle: Vehicle) -> float:
     """Distance of the last wheelset or floor point behind the reference body [m]."""
     flat, placed = flatten(vehicle), sensors(vehicle)
     wheelsets = flat.along(flat.of_kind("wheelset"))

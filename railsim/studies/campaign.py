@@ -97,7 +97,7 @@ def campaign(
                 check_outputs(case.vehicle, case.settings, case.speed, plan.standard)
         Faults(dict.fromkeys(faults)).check()
     remark = how.get("on_remark") or _LOG.warning
-    for words in left_out(plan, names, cases):
+    for words in omissions(plan, names, cases):
         remark(words)
     spec = StudySpec(
         folder=relative(Path.cwd(), folder),
@@ -119,7 +119,7 @@ def campaign(
     return Campaign(folder, tuple(assessments), results, outcome.computed)
 
 
-def left_out(
+def omissions(
     plan: Scenario, vehicles: Sequence[str | Path], cases: Sequence[Case]
 ) -> Iterator[str]:
     """Yield what a vehicle would need for each condition in which it is not tested.

@@ -36,7 +36,7 @@ from railsim.result.sinks import matches
 from railsim.simulation.outputs import extra_quantities
 from railsim.simulation.preparation import check_own_outputs, check_step
 from railsim.studies import execute
-from railsim.studies.case import Case, of_settings
+from railsim.studies.case import Case, settings_fault
 from railsim.studies.journal import JOURNAL, Journal, Records
 from railsim.studies.outcome import Outcome
 from railsim.studies.plan import Point, check_names
@@ -358,7 +358,7 @@ def _check_settings(
             continue  # with a longer step
 
         def add_run_name(fault: Fault, name: str = case.name) -> Fault:
-            return replace(of_settings(fault, runs[name], grid), found=f"{fault.found}, {name}")
+            return replace(settings_fault(fault, runs[name], grid), found=f"{fault.found}, {name}")
 
         inputs = case.vehicle, case.track, case.settings
         with faults.caught(add_run_name), suppress(ModelError):  # the outcome of the run

@@ -94,7 +94,7 @@ def _leads_to(name: str, key: str) -> bool:
     return all((str(AXES.index(p)) if p in AXES else p) in parts for p in name.split("."))
 
 
-def as_written(fault: Fault, grid: Collection[str], kind: str = "") -> Fault:
+def assignment_fault(fault: Fault, grid: Collection[str], kind: str = "") -> Fault:
     """Return the fault of an assignment with its key and option as given."""
     if fault.file != OVERRIDE:
         return fault
@@ -104,14 +104,14 @@ def as_written(fault: Fault, grid: Collection[str], kind: str = "") -> Fault:
     return replace(fault, file=parameter, option=option, key=key)
 
 
-def of_settings(fault: Fault, run: RunSpec, grid: Collection[str] = ()) -> Fault:
+def settings_fault(fault: Fault, run: RunSpec, grid: Collection[str] = ()) -> Fault:
     """Return a fault of the settings with the file or the assignment that gives them."""
     if fault.file != "settings":
         return fault
     key = f"settings.{fault.key}"
     assigned = (text.partition("=")[0].strip() for text in run.assignments)
     if any(_leads_to(name, key) or name.startswith(f"{key}.") for name in assigned):
-        return as_written(replace(fault, file=OVERRIDE), grid, "settings")
+        return assignment_fault(replace(fault, file=OVERRIDE), grid, "settings")
     return fault if run.settings is None else replace(fault, file=str(run.settings))
 
 
@@ -146,7 +146,7 @@ class Loader:
         return self._loaded(kind, getattr(run, kind), self.overrides(run.assignments)[kind])
 
     def _load(self, kind: str, path: str | Path | None, overrides: Overrides) -> Any:
-        with self.faults.caught(lambda fault: as_written(fault, self._grid, kind)):
+        with self.faults.caught(lambda fault: assignment_fault(fault, self._grid, kind)):
             definition = LOADERS[kind](path, overrides)
             self.faults += profile_faults(definition, str(path))
             return definition
@@ -156,7 +156,7 @@ class Loader:
         """Return the assignments to vehicle, track and settings, each with the file's own keys."""
         overrides: dict[str, Overrides] = dict.fromkeys(LOADERS, ())
         for text in assignments:
-            with self.faults.caught(lambda fault: as_written(fault, self._grid)):
+            with self.faults.caught(lambda fault: assignment_fault(fault, self._grid)):
                 for kind, some in split_overrides([text]).items():
                     overrides[kind] += tuple(some)
         return overrides
@@ -209,7 +209,7 @@ class Loader:
 
                 with faults.caught(add_analysis):
                     check_outputs(vehicle, settings, speed, analysis.standard, coarse=True)
-        return [of_settings(fault, run, self._grid) for fault in faults]
+        return [settings_fault(fault, run, self._grid) for fault in faults]
 
 
 def _misfits(

@@ -213,9 +213,9 @@ class _Pool:
             for folder in {job.path.parent for job in self._jobs}:
                 sweep(folder)  # left by a process that was killed
         if broken:
-            self.lost = self._lost()
+            self.lost = self._lost_jobs()
 
-    def _lost(self) -> set[int]:
+    def _lost_jobs(self) -> set[int]:
         """Return the jobs of the process that died; the pool has terminated the others."""
         for process in self._pool.begun:
             process.join(GRACE)

@@ -53,7 +53,7 @@ def open_results(paths: Sequence[Path]) -> dict[str, Result]:
     return results
 
 
-def without_file(folder: Path) -> list[str]:
+def runs_without_file(folder: Path) -> list[str]:
     """Return the runs of a study without a result file: failed, waiting, or its file not kept.
 
     Of a study that was killed, which has a journal only, those that had ended.

@@ -81,8 +81,8 @@ class Plan:
         self._spec = spec
         self._loader = Loader(spec.varied_keys, spec.analyses, contacts=True)
         # hashes of files; each is read once
-        self._fingerprint = cache(self._with_overrides)
-        self._base, self._content = cache(self._of_file), cache(_content_hash)
+        self._fingerprint = cache(self._definition_hash)
+        self._base, self._content = cache(self._file_hash), cache(_content_hash)
         # what the record of a run depends on besides the run
         self._further = [f"told {function}"] if (function := fingerprint(spec.quantities)) else []
         self._further += [f"analyses {spec.analyses}"] if spec.analyses else []
@@ -163,7 +163,7 @@ class Plan:
             return ROUGH_DURATION
         return max(0.0, length - spec.start) / max(first, 0.5)
 
-    def _with_overrides(self, kind: str, path: str | Path | None, overrides: Overrides) -> str:
+    def _definition_hash(self, kind: str, path: str | Path | None, overrides: Overrides) -> str:
         """Return the hash of a file with assignments; empty if it cannot be read."""
         base = self._base(kind, path)
         if not base:
@@ -171,7 +171,7 @@ class Plan:
         contents = [self._content(name) for text in overrides for name in _named_files(text)]
         return _hash([base, *overrides, *contents])
 
-    def _of_file(self, kind: str, path: str | Path | None) -> str:
+    def _file_hash(self, kind: str, path: str | Path | None) -> str:
         if path is None:
             return "defaults"
         try:
@@ -243,10 +243,10 @@ def check_study(study: Study) -> None:
 
 def selects(criterion: Value, labels: Mapping[str, Any]) -> bool:
     """Whether a run has the labels of a value of an optimisation."""
-    return all(_alike(labels.get(key), value) for key, value in criterion.where.items())
+    return all(_equals(labels.get(key), value) for key, value in criterion.where.items())
 
 
-def _alike(label: object, value: object) -> bool:
+def _equals(label: object, value: object) -> bool:
     """Whether a label, a text in a grid, equals a value."""
     try:
         return label == value or float(str(label)) == float(str(value))

@@ -43,19 +43,19 @@ class RunSpec:
     assignments: tuple[str, ...] = ()
 
 
-def _several(values: Any) -> list[Any]:
+def _as_list(values: Any) -> list[Any]:
     several = isinstance(values, Iterable) and not isinstance(values, str)
     return list(values) if several else [values]
 
 
 def _file_names(values: Any) -> list[str]:
-    return [str(value) for value in _several(values)]
+    return [str(value) for value in _as_list(values)]
 
 
 def _texts(key: str, values: Any) -> list[str]:
     """Return one or several values of a key, or ranges, as they are written in assignments."""
     found: list[str] = []
-    for value in _several(values):
+    for value in _as_list(values):
         plain = value.item() if hasattr(value, "item") else value  # numpy's numbers
         try:
             found += value_texts(plain if isinstance(plain, str) else (plain,))
@@ -67,7 +67,7 @@ def _texts(key: str, values: Any) -> list[str]:
 def _speeds(speeds: Any) -> list[float | str | None]:
     """Return speeds, ranges and speeds with units as numbers [m/s]; `PERMITTED` unchanged."""
     found: list[float | str | None] = []
-    for speed in [None] if speeds is None else _several(speeds):
+    for speed in [None] if speeds is None else _as_list(speeds):
         if isinstance(speed, str) and speed != PERMITTED:
             found += [speed_of(text) for text in _texts("speeds", speed)]
         else:

@@ -139,7 +139,7 @@ def map_table(records: Sequence[Record], parameters: Mapping[str, str]) -> Table
     columns += [Column(words, unit="m/s", format=".2f") for words in speeds]
     of_point = zip(records, *speeds.values(), strict=True)
     rows = [[*(record["at"][name] for name in parameters), *cells] for record, *cells in of_point]
-    missing = [_without_linear(record) for record in records]
+    missing = [_why_no_linear(record) for record in records]
     if any(missing):
         columns.append(Column("linear", " "))
         rows = [[*row, words] for row, words in zip(rows, missing, strict=True)]
@@ -152,7 +152,7 @@ def map_table(records: Sequence[Record], parameters: Mapping[str, str]) -> Table
     return Table(columns, rows, ", ".join(words))
 
 
-def _without_linear(record: Record) -> str:
+def _why_no_linear(record: Record) -> str:
     """Why a point has no linear critical speed; empty where it has one."""
     if record["linear"]:
         return ""

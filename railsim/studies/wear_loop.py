@@ -305,12 +305,12 @@ def _file_name(
         __version__, KEPT, law.name, law.constants, step, settings.to_toml(),
         [profile.key().hex() for profile in worn.values()],
         [(r.vehicle.to_toml(), r.track.to_toml(), r.speed, r.share) for r in wearing.runs],
-        sorted(profile.key().hex() for r in wearing.runs for profile in _others(wearing, r)),
+        sorted(profile.key().hex() for r in wearing.runs for profile in _unworn(wearing, r)),
     ]  # fmt: skip
     return f"{hashlib.sha256(json.dumps(inputs).encode()).hexdigest()[:24]}.json"
 
 
-def _others(wearing: Wearing, run: Run) -> list[Profile]:
+def _unworn(wearing: Wearing, run: Run) -> list[Profile]:
     """Profiles of a run that do not wear."""
     both = (*used_profiles(run.vehicle), *used_profiles(run.track))
     names = {name for _, name, _ in both}

@@ -26,7 +26,7 @@ from railsim.profiles import load_profile
 from railsim.studies.campaign import (
     campaign,
     counting_sections,
-    left_out,
+    omissions,
     part_speed,
     scenario_cases,
     with_fitted_curves,
@@ -120,7 +120,7 @@ def test_fault_modes_change_the_vehicle_and_load_cases_that_are_unknown_are_left
     scenario.write_text(FAULTS)
     cases = scenario_cases(load_scenario(scenario), ["coach_manchester"])
     assert [case.labels["condition"] for case in cases] == ["whole", "no_lateral_damper", "soft"]
-    (said,) = left_out(load_scenario(scenario), ["coach_manchester"], cases)
+    (said,) = omissions(load_scenario(scenario), ["coach_manchester"], cases)
     needed = "which needs a load case 'crushed' (it has laden)"
     assert said.endswith(f"not tested in the condition 'crushed', {needed}")
     whole, removed, soft = (case.vehicle for case in cases)
@@ -138,7 +138,7 @@ def test_runs_without_a_section_that_counts_are_told_before_they_are_run():
     scenario = load_scenario("en14363")
     slow = ["vehicle.service.admissible_speed=11.0", "vehicle.service.cant_deficiency=0.1"]
     cases = scenario_cases(scenario, ["coach_manchester"], slow)
-    said = [words.split(": at ")[0] for words in left_out(scenario, ["coach_manchester"], cases)]
+    said = [words.split(": at ")[0] for words in omissions(scenario, ["coach_manchester"], cases)]
     conditions = {case.labels["condition"] for case in cases}
     assert {words.split("_seed")[0] for words in said} == {
         f"coach_manchester_{state}_{zone}" for state in conditions for zone in ("zone2", "zone3")

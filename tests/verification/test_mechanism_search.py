@@ -8,7 +8,7 @@ from railsim.definitions.loading import load_mechanism
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.checks import checks
-from railsim.mechanisms.judgement import Judge, Judgement, firm
+from railsim.mechanisms.judgement import Judge, Judgement, is_firm
 from railsim.mechanisms.kinematics import folded, solve
 from railsim.mechanisms.optimisation import _least_breach, optimise
 from railsim.mechanisms.optimum import Start, best_of
@@ -386,7 +386,7 @@ def test_a_search_weighs_objective_and_breaches():
         assert judged.objective == pytest.approx(5.0)
         assert judged.gradient == pytest.approx([-1.0, 4.0])
     names = ("dead_point", "lift_stroke", "max_stroke", "driver_dead_point", "min_force")
-    assert [firm(name) for name in names] == [True, True, False, True, False]
+    assert [is_firm(name) for name in names] == [True, True, False, True, False]
 
 
 def test_least_breach_is_found_where_limits_exclude_each_other_or_one_cannot_be_met():

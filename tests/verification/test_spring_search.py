@@ -225,7 +225,7 @@ def test_limits_in_the_way_are_told_with_their_size(slack, said):
     wires = SimpleNamespace(d=np.array([[0.038], [0.022]]))
     nearest = springs_search._Optimum(wires, {"outer_diameter": slack, "inner_diameter": 0.2})
     tried = SimpleNamespace(tried=400, broken={"outer_diameter": 100, "stiffness": 40})
-    (fault,) = springs_search._nothing_fits(SimpleNamespace(name="s"), tried, [nearest])
+    (fault,) = springs_search._no_nest_faults(SimpleNamespace(name="s"), tried, [nearest])
     assert fault.found == f"no nest fits: the limit 'outer_diameter' {said}"
 
 
