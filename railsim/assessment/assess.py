@@ -7,10 +7,10 @@ from typing import Any
 
 from railsim.assessment.assessment import Assessment
 from railsim.assessment.comfort_report import (
-    caused_by_hunting,
+    block_remark,
     comfort_report,
-    short_of_blocks,
-    underestimated,
+    hunting_remark,
+    shock_remark,
 )
 from railsim.assessment.record import LEFT_OUT, RUNNING, Record, TooShort
 from railsim.assessment.running import assess_running, by_vehicle, running_limits
@@ -110,10 +110,10 @@ def assess(
     if isinstance(results, Result):
         results = {str(results.attributes.get("run", "run")): results}
     if not isinstance(results, Mapping) or not all(
-        isinstance(one, Result) for one in results.values()
+        isinstance(result, Result) for result in results.values()
     ):
-        words = "give what railsim.open_result returns, or several by their names"
-        raise TypeError(f"the results are a {type(results).__name__}; {words}")
+        remedy = "give what railsim.open_result returns, or several by their names"
+        raise TypeError(f"the results are a {type(results).__name__}; {remedy}")
     if standard not in STANDARDS:
         raise argument_error("standard", standard, "one of " + ", ".join(STANDARDS))
     check_options(
@@ -130,10 +130,10 @@ def assess(
             )
             for runs in groups
         ]  # fmt: skip
-    return [_by_runs(runs, standard, limits, law, coarse) for runs in groups]
+    return [_assess_by_run(runs, standard, limits, law, coarse) for runs in groups]
 
 
-def _by_runs(
+def _assess_by_run(
     runs: Mapping[str, Result],
     standard: str,
     limits: str | Path | None,
@@ -142,49 +142,48 @@ def _by_runs(
 ) -> Assessment:
     """Comfort, wear or safety, run by run."""
     vehicle = next(iter(runs.values())).vehicle().name
-    reports: dict[str, Callable[[Record], Any]]
-    reports = {"comfort": comfort_report, "safety": safety_report}
-    reports["wear"] = partial(wear_report, law=law)
-    records, found, short = dict[str, Record](), dict[str, Any](), list[TooShort]()
+    report_of: dict[str, Callable[[Record], Any]]
+    report_of = {"comfort": comfort_report, "safety": safety_report}
+    report_of["wear"] = partial(wear_report, law=law)
+    records, reports, short = dict[str, Record](), dict[str, Any](), list[TooShort]()
     for name, result in runs.items():
         try:
             records[name] = Record(result, name, coarse=coarse)
-            found[name] = reports[standard](records[name])
+            reports[name] = report_of[standard](records[name])
         except TooShort as error:
             if standard == "safety":  # it may have derailed
                 raise
             short.append(error)
-    if not found:
+    if not reports:
         raise TooShort(fault for error in short for fault in error.faults)
     remarks = [f"{LEFT_OUT}{error}" for error in short]
-    remarks += [remark for name in found for remark in records[name].remarks()]
+    remarks += [remark for name in reports for remark in records[name].remarks()]
     for name, result in runs.items():
         if result.status != "complete":
-            part = "; only the part before that is assessed" if name in found else ""
+            part = "; only the part before that is assessed" if name in reports else ""
             remarks.append(f"{status_words(name, result)}{part}")
-    about = vehicle, standard, tuple(runs)
+    subject = vehicle, standard, tuple(runs)
     driven = {}
     for name, result in runs.items():
         track = result.track()
         rails = "; ".join(part.summary() for part in track.irregularities[:2])
         driven[name] = result.speed, track.name, rails or "smooth rails"
     if standard == "safety":
-        return Assessment(*about, safety=found, remarks=tuple(remarks))
+        return Assessment(*subject, safety=reports, remarks=tuple(remarks))
     if standard == "wear":
-        if bare := [name for name, wheels in found.items() if wheels[0].fatigue_index is None]:
+        if without := [name for name, wheels in reports.items() if wheels[0].fatigue_index is None]:
             remedy = "run with settings.outputs.contact_patches=true"
-            words = "USFD and FI_surf have no values without contact patches"
-            remarks.append(f"{listed(bare)}: {words}; {remedy}")
-        if (model := next(iter(found.values()))[0].model) != WholeLifeRailModel():
-            counted = f"threshold {model.threshold:g} N, counted: {model.counted}"
-            remarks.append(f"Whole Life Rail Model of {law}: {counted}")
-        return Assessment(*about, wear=found, remarks=tuple(remarks), driven=driven)
+            lacking = "USFD and FI_surf have no values without contact patches"
+            remarks.append(f"{listed(without)}: {lacking}; {remedy}")
+        if (model := next(iter(reports.values()))[0].model) != WholeLifeRailModel():
+            parameters = f"threshold {model.threshold:g} N, counted: {model.counted}"
+            remarks.append(f"Whole Life Rail Model of {law}: {parameters}")
+        return Assessment(*subject, wear=reports, remarks=tuple(remarks), driven=driven)
     classes = load_comfort_limits(limits or "comfort")
-    for name, points in found.items():
-        said = [short_of_blocks(points), underestimated(points)]
-        said += [caused_by_hunting(records[name], points)]
-        remarks += [f"{name}: {sentence}" for sentence in said if sentence]
+    for name, points in reports.items():
+        texts = block_remark(points), shock_remark(points), hunting_remark(records[name], points)
+        remarks += [f"{name}: {text}" for text in texts if text]
     if not classes.mean_comfort.checked:
         remarks.append(f"classes of {classes.edition} not checked against the printed standard")
-    said_once = tuple(dict.fromkeys(remarks))
-    return Assessment(*about, comfort=found, remarks=said_once, limits=classes, driven=driven)
+    distinct = tuple(dict.fromkeys(remarks))
+    return Assessment(*subject, comfort=reports, remarks=distinct, limits=classes, driven=driven)

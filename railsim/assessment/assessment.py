@@ -82,14 +82,14 @@ class Assessment:
     @property
     def exceeded(self) -> bool:
         """Whether a limit is exceeded or a run derailed."""
-        of_runs = any(report.exceeded for report in self.safety.values())
-        return self.verdict in (FAIL, DERAILED) or of_runs
+        in_runs = any(report.exceeded for report in self.safety.values())
+        return self.verdict in (FAIL, DERAILED) or in_runs
 
     @property
     def reasons(self) -> tuple[str, ...]:
         """Reasons why it is not a pass, of all verdicts."""
-        found = [why for verdict in self.verdicts.values() for why in verdict.reasons]
-        return tuple(dict.fromkeys(found))
+        reasons = [reason for verdict in self.verdicts.values() for reason in verdict.reasons]
+        return tuple(dict.fromkeys(reasons))
 
     @property
     def quality(self) -> tuple[SectionRow, ...]:
@@ -104,13 +104,13 @@ class Assessment:
 
     def worst_in(self, zone: str) -> dict[str, tuple[ZoneReport, Assessed]]:
         """By quantity, the value with the largest share of its limit in a zone, and where it is."""
-        found: dict[str, tuple[ZoneReport, Assessed]] = {}
+        worst: dict[str, tuple[ZoneReport, Assessed]] = {}
         for report in self.zones:
             for row in report.rows if report.zone == zone else ():
-                before = found.get(row.criterion.name)
+                before = worst.get(row.criterion.name)
                 if before is None or row.rank > before[1].rank:
-                    found[row.criterion.name] = report, row
-        return found
+                    worst[row.criterion.name] = report, row
+        return worst
 
     def plot(self, path: str | Path | None = None, *, overwrite: bool = False) -> "Figure":
         """Draw estimates against limits, comfort or wear; also into the file of `path`."""
@@ -121,7 +121,7 @@ class Assessment:
         limits = self.limits
         comfort = {}
         if isinstance(limits, ComfortLimits):
-            comfort = {run: [p.record(limits) for p in own] for run, own in self.comfort.items()}
+            comfort = {run: [p.record(limits) for p in x] for run, x in self.comfort.items()}
         return {
             "vehicle": self.vehicle, "standard": self.standard,
             "edition": limits.edition if limits else None, "runs": list(self.runs),
@@ -131,7 +131,7 @@ class Assessment:
             "conditions": [condition.record() for condition in self.conditions],
             "zones": [zone.record() for zone in self.zones],
             "hunting_frequency": self.hunting_frequency,
-            "regression": [one.record() for one in self.influences],
+            "regression": [row.record() for row in self.influences],
             "sections": [row.record() for row in self.sections],
             "transitions": {run: [v.record() for v in x] for run, x in self.transitions.items()},
             "comfort": comfort,

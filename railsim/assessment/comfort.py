@@ -96,8 +96,8 @@ def running_mean(x: Floats, rate: float, length: float) -> Floats:
     size = round(length * rate)
     if len(x) <= size:
         return np.zeros((0, *x.shape[1:]))
-    summed = integral(np.arange(len(x)) / rate, x)
-    return np.asarray((summed[size:] - summed[:-size]) * (rate / size))
+    cumulative = integral(np.arange(len(x)) / rate, x)
+    return np.asarray((cumulative[size:] - cumulative[:-size]) * (rate / size))
 
 
 TRANSITION: Mapping[str, tuple[float, float, float, float, float]] = {
@@ -188,12 +188,12 @@ def transition_comfort(
     middles = time[: len(time) - size] + 0.5
     means = running_mean(low_passed(lateral, rate, 2.0), rate, 1.0)
     rolls = running_mean(low_passed(roll_rate, rate, 2.0), rate, 1.0)
-    there = (middles >= begin) & (middles <= end + 1.6)
-    acceleration = float(np.max(np.abs(means[there])))
+    in_window = (middles >= begin) & (middles <= end + 1.6)
+    acceleration = float(np.max(np.abs(means[in_window])))
     changes = np.abs(means[size:] - means[:-size])
     first = middles[: len(changes)]
-    of_jerk = (first >= begin - 1.0) & (first + 1.0 <= end + 1.6)
-    jerk = float(np.max(changes[of_jerk]))
+    in_jerk_window = (first >= begin - 1.0) & (first + 1.0 <= end + 1.6)
+    jerk = float(np.max(changes[in_jerk_window]))
     inside = (middles >= begin) & (middles <= end)
     rolling = float(np.degrees(np.max(np.abs(rolls[inside])))) if inside.any() else 0.0
     felt = acceleration, jerk, rolling

@@ -84,31 +84,31 @@ def comfort_report(record: Record) -> list[PointComfort]:
         raise input_error(record.name, "is not in the result", allowed, "sensor_acceleration")
     columns = [list(record.sensors).index(name) for name in names]
     frequency = float(record.result.attributes.get("hunting_frequency", 0.0))
-    gathered = [_Gathered(frequency) for _ in names]
+    sums = [_PointSums(frequency) for _ in names]
     for rows, counted in record.pieces(MARGIN):
         a = record.readings(rows)[0]
-        for column, into in zip(columns, gathered, strict=True):
-            into.add(a[:, column], counted, record.rate)
-    if not gathered[0].blocks:
+        for column, point in zip(columns, sums, strict=True):
+            point.add(a[:, column], counted, record.rate)
+    if not sums[0].blocks:
         allowed = "at least 5 s after the first 3 s"
         raise record.too_short("too short for one block of 5 s", allowed)
     transitions = _transitions(record, columns)
     return [
         PointComfort(
             name, record.sensor_offset(name),
-            comfort.mean_comfort(np.concatenate(into.blocks), np.concatenate(into.back)),
-            np.sqrt(into.iso / into.count), np.sqrt(into.largest),
-            (into.fourth / record.rate) ** 0.25,
-            {k: index_of_rms(float(np.sqrt(v / into.count))) for k, v in into.sperling.items()},
-            tuple(transitions[number]), into.events,
-            float(into.hunting / into.iso[1]) if frequency else 0.0,
-            into.count / record.rate,
+            comfort.mean_comfort(np.concatenate(point.blocks), np.concatenate(point.back)),
+            np.sqrt(point.iso / point.count), np.sqrt(point.largest),
+            (point.fourth / record.rate) ** 0.25,
+            {k: index_of_rms(float(np.sqrt(v / point.count))) for k, v in point.sperling.items()},
+            tuple(transitions[number]), point.events,
+            float(point.hunting / point.iso[1]) if frequency else 0.0,
+            point.count / record.rate,
         )
-        for number, (name, into) in enumerate(zip(names, gathered, strict=True))
+        for number, (name, point) in enumerate(zip(names, sums, strict=True))
     ]  # fmt: skip
 
 
-class _Gathered:
+class _PointSums:
     """Sums and blocks of one point over the parts of a run that hunts at `frequency`, or 0 [Hz].
 
     ISO 2631-1:1997 of a seated person: Wd, Wd, Wk, factors 1; VDV = (integral of aw^4 dt)^(1/4).
@@ -135,8 +135,8 @@ class _Gathered:
         iso = np.column_stack([floor[:, 0], floor[:, 1], WK.weighted(a[:, 2], rate)])
         self.iso += np.sum(iso[counted] ** 2, axis=0)
         self.fourth += np.sum(iso[counted] ** 4, axis=0)
-        first = counted.start - round(rate) * bool(count)  # windows reach into the part before
-        running = comfort.running_mean(iso[first : counted.stop] ** 2, rate, 1.0)
+        begin = counted.start - round(rate) * bool(count)  # windows reach into the part before
+        running = comfort.running_mean(iso[begin : counted.stop] ** 2, rate, 1.0)
         self.largest = np.max([self.largest, np.max(running, axis=0, initial=0.0)], axis=0)
         self.count += size
         if self.frequency:
@@ -144,8 +144,8 @@ class _Gathered:
             near = band_passed(floor[:, 1], rate, low, high)[counted]
             self.hunting += float(np.sum(near**2))
         for axis, way in enumerate(self.sperling, start=1):
-            weighted = sperling_weighted(a[:, axis], rate, way)[counted]
-            self.sperling[way] += float(np.sum(weighted**2))
+            ride = sperling_weighted(a[:, axis], rate, way)[counted]
+            self.sperling[way] += float(np.sum(ride**2))
         # events over the end of the part before belong to neither of both
         before = round(comfort.EVENT_WINDOW * rate) if count else 0
         part = slice(counted.start - before, counted.stop)
@@ -154,7 +154,7 @@ class _Gathered:
 
 
 def _transitions(record: Record, columns: list[int]) -> list[list[comfort.TransitionComfort]]:
-    found: list[list[comfort.TransitionComfort]] = [[] for _ in columns]
+    transitions: list[list[comfort.TransitionComfort]] = [[] for _ in columns]
     names = list(record.sensors)
     for section in curvature_sections(record.result.track()):
         if section.type != "CLO":
@@ -169,13 +169,13 @@ def _transitions(record: Record, columns: list[int]) -> list[list[comfort.Transi
             if s[0] > section.begin or s[-1] < section.end:
                 continue
             begin, end = np.interp([section.begin, section.end], s, time)
-            one = comfort.transition_comfort(time, a[:, column, 1], roll[:, column], begin, end)
-            if one is not None:
-                found[number].append(one)
-    return found
+            value = comfort.transition_comfort(time, a[:, column, 1], roll[:, column], begin, end)
+            if value is not None:
+                transitions[number].append(value)
+    return transitions
 
 
-def caused_by_hunting(record: Record, points: list[PointComfort]) -> str:
+def hunting_remark(record: Record, points: list[PointComfort]) -> str:
     """Sentence that names hunting as a cause of discomfort; empty where the vehicle does not."""
     most = max(points, key=lambda point: point.hunting)
     if not most.hunting:
@@ -187,14 +187,14 @@ def caused_by_hunting(record: Record, points: list[PointComfort]) -> str:
     )
 
 
-def underestimated(points: list[PointComfort]) -> str:
+def shock_remark(points: list[PointComfort]) -> str:
     """Sentence where the rms may underestimate shocks, by the criteria of ISO 2631-1:1997, 6.3.3.
 
     MTVV/a_w > 1.5 or VDV/(a_w T^(1/4)) > 1.75, from memory; the largest of all points and axes but
     those along which MTVV or VDV is less than a quarter of that along another one, or MTVV below
     the threshold of perception (annex C, 0.01 to 0.02 m/s2, from memory).
     """
-    said = []
+    exceedances = []
     for name, limit in SHOCKS.items():
         ratios = []
         for p in points:
@@ -204,12 +204,12 @@ def underestimated(points: list[PointComfort]) -> str:
                     ratios.append((float(value / rms / time), f"along {axis} at {p.sensor}"))
         ratio, place = max(ratios, default=(0.0, ""))
         if ratio > limit:
-            said.append(f"{name} {ratio:.2f} > {limit:g} {place}")
+            exceedances.append(f"{name} {ratio:.2f} > {limit:g} {place}")
     end = "the rms of ISO 2631-1 may underestimate shocks: judge by MTVV and VDV, too"
-    return f"{', '.join(said)}: {end}" if said else ""
+    return f"{', '.join(exceedances)}: {end}" if exceedances else ""
 
 
-def short_of_blocks(points: list[PointComfort]) -> str:
+def block_remark(points: list[PointComfort]) -> str:
     """Sentence if there are fewer blocks than the standard requires; otherwise empty."""
     blocks = points[0].mean.blocks
     few = f"{blocks} blocks of 5 s, EN 12299 requires {comfort.BLOCKS}"

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.assessment import signals as of
+from railsim.assessment import signals as signal
 from railsim.assessment.sections import TestSection
 from railsim.assessment.signals import Band, Signal, Signals
 from railsim.definitions.vehicle.flatten import flatten
@@ -85,7 +85,7 @@ def rms(x: Floats, _: int) -> list[float]:
     return [float(np.sqrt(np.mean(x**2)))]
 
 
-def transferred(x: Floats, turn: int) -> list[float]:
+def outward_high(x: Floats, turn: int) -> list[float]:
     """99.85 % value of what has moved outwards, on straight track to either side."""
     return high(x if turn else np.abs(x), turn)
 
@@ -110,17 +110,17 @@ class Measured:
         signal = signals.signal(self.signal, self.band)
         if signal is None or (self.curves and not section.turn):
             return {}
-        found = {}
+        by_place = {}
         for k, (label, side) in enumerate(signal.places):
             wheel = section.wheel(side)
             if side is not None and wheel not in self.wheels:
                 continue
             values = signal.in_section(k, section, self.window)
-            if len(values) and (value := self.evaluated(values, section.turn)):
-                found[f"{label} {wheel}".rstrip()] = value
-        return found
+            if len(values) and (value := self.evaluate(values, section.turn)):
+                by_place[f"{label} {wheel}".rstrip()] = value
+        return by_place
 
-    def evaluated(self, x: Floats, turn: int) -> list[float]:
+    def evaluate(self, x: Floats, turn: int) -> list[float]:
         """Value of a section from those of its signal over time."""
         return self.value((self.outwards * turn or 1) * x, turn)
 
@@ -143,13 +143,13 @@ class Instability:
             return {}
         length = min(RMS_LENGTH, section.end - section.begin)
         centres = window_centres(section.begin, section.end, length, RMS_STEP)
-        found = {}
+        by_place = {}
         for k, (place, _) in enumerate(signal.places):
             rows = signal.rows(k, section)
             s, square = signal.s[rows, k], np.square(signal.values[rows, k])
             largest = np.max(distance_means(s, square, centres, length))
-            found[place] = [math.sqrt(max(float(largest), 0.0))]
-        return found
+            by_place[place] = [math.sqrt(max(float(largest), 0.0))]
+        return by_place
 
 
 def steering(signals: Signals, section: TestSection) -> Values:
@@ -186,8 +186,8 @@ def steering_index(geometry: "ContactGeometry", radius: float, rolling_radius: f
     free = ahead[y[ahead] < y[touching[0]]] if len(touching) else ahead[:0]
     if not len(free) or difference[free[-1]] <= 0.0:
         return math.nan
-    apart = float(np.ptp(geometry.contact_y[ahead[0]]))
-    return float(apart * rolling_radius / abs(radius) / difference[free[-1]])
+    contact_distance = float(np.ptp(geometry.contact_y[ahead[0]]))
+    return float(contact_distance * rolling_radius / abs(radius) / difference[free[-1]])
 
 
 @dataclass(frozen=True)
@@ -221,65 +221,66 @@ BOTH = ("normal", "simplified")
 SIMPLIFIED = ("simplified",)
 _ROWS = (
     Criterion("sum_Y", "track shift force, 2 m", "kN", SAFETY, "safety",
-              Measured(of.track_shifting_force, FORCES, outer_end, window=2.0, outwards=-1),
+              Measured(signal.track_shifting_force, FORCES, outer_end, window=2.0, outwards=-1),
               meaning="shifting of ballasted track: k1 (10 kN + 2 Q0/3), 2 Q0 the static axle load "
               "(Prud'homme)"),
     Criterion("Y_over_Q", "derailment quotient, 2 m", "-", SAFETY, "safety",
-              Measured(of.quotient, FORCES, high, window=2.0, curves=True),
+              Measured(signal.quotient, FORCES, high, window=2.0, curves=True),
               meaning="flange climbing of the outer wheel"),
     Criterion("instability", "rms of track shift force, 100 m", "kN", SAFETY, "largest",
-              Instability(of.track_shifting_force),
+              Instability(signal.track_shifting_force),
               meaning="instability: half of the limit of the track shift force"),
-    Criterion("Q", "wheel load", "kN", LOADING, "loading", Measured(of.wheel_load, FORCES, high),
+    Criterion("Q", "wheel load", "kN", LOADING, "loading",
+              Measured(signal.wheel_load, FORCES, high),
               meaning="track loading: 90 kN + Q0, at most a value that depends on the speed"),
     Criterion("Q_qst", "quasi-static wheel load", "kN", LOADING, "quasi_static",
-              Measured(of.wheel_load, FORCES, middle, curves=True),
+              Measured(signal.wheel_load, FORCES, middle, curves=True),
               meaning="quasi-static vertical wheel force on the outer rail in curves"),
     Criterion("Y_qst", "quasi-static guiding force", "kN", LOADING, "quasi_static",
-              Measured(of.guiding_force, FORCES, middle, curves=True),
+              Measured(signal.guiding_force, FORCES, middle, curves=True),
               meaning="quasi-static guiding force on the outer rail, by the mean radius of the "
               "sections"),
     Criterion("body_y_safety", "lateral body acceleration, 6 Hz", "m/s2", SAFETY, "safety",
-              Measured(of.body_lateral, (None, 6.0), outer_end, outwards=1), SIMPLIFIED,
+              Measured(signal.body_lateral, (None, 6.0), outer_end, outwards=1), SIMPLIFIED,
               "lateral acceleration of the body, safety"),
     Criterion("body_z_safety", "vertical body acceleration, 0.4 to 4 Hz", "m/s2", SAFETY, "safety",
-              Measured(of.body_vertical, (0.4, 4.0), both_ends), SIMPLIFIED,
+              Measured(signal.body_vertical, (0.4, 4.0), both_ends), SIMPLIFIED,
               "vertical acceleration of the body, safety"),
     Criterion("frame_y", "lateral bogie frame acceleration, 10 Hz", "m/s2", SAFETY, "safety",
-              Measured(of.frame_lateral, (None, 10.0), outer_end, outwards=1), SIMPLIFIED,
+              Measured(signal.frame_lateral, (None, 10.0), outer_end, outwards=1), SIMPLIFIED,
               "lateral acceleration of the bogie frame, by its mass"),
     Criterion("frame_instability", "rms of bogie frame acceleration, 100 m", "m/s2", SAFETY,
-              "largest", Instability(of.frame_lateral), SIMPLIFIED,
+              "largest", Instability(signal.frame_lateral), SIMPLIFIED,
               "instability: half of the limit of the acceleration of the bogie frame"),
     Criterion("body_y", "lateral body acceleration", "m/s2", RIDE, "ride",
-              Measured(of.body_lateral, RIDE_BAND, both_ends, outwards=1), BOTH,
+              Measured(signal.body_lateral, RIDE_BAND, both_ends, outwards=1), BOTH,
               "lateral acceleration of the body, ride"),
     Criterion("body_z", "vertical body acceleration", "m/s2", RIDE, "ride",
-              Measured(of.body_vertical, RIDE_BAND, both_ends), BOTH,
+              Measured(signal.body_vertical, RIDE_BAND, both_ends), BOTH,
               "vertical acceleration of the body, ride"),
     Criterion("body_y_rms", "lateral body acceleration, rms", "m/s2", RIDE, "ride",
-              Measured(of.body_lateral, RIDE_BAND, rms), BOTH,
+              Measured(signal.body_lateral, RIDE_BAND, rms), BOTH,
               "lateral acceleration of the body, ride, rms"),
     Criterion("body_z_rms", "vertical body acceleration, rms", "m/s2", RIDE, "ride",
-              Measured(of.body_vertical, RIDE_BAND, rms), BOTH,
+              Measured(signal.body_vertical, RIDE_BAND, rms), BOTH,
               "vertical acceleration of the body, ride, rms"),
     Criterion("body_y_qst", "lateral body acceleration, quasi-static", "m/s2", RIDE, "quasi_static",
-              Measured(of.body_lateral, FORCES, middle, curves=True, outwards=1), BOTH,
+              Measured(signal.body_lateral, FORCES, middle, curves=True, outwards=1), BOTH,
               "quasi-static lateral acceleration of the body in curves"),
     Criterion("Q_low", "smallest wheel load, 0.15 %", "kN", INFORMATION, "smallest",
-              Measured(of.wheel_load, FORCES, low, wheels=ALL)),
+              Measured(signal.wheel_load, FORCES, low, wheels=ALL)),
     Criterion("Y_max", "guiding force", "kN", INFORMATION, "loading",
-              Measured(of.guiding_force, FORCES, high)),
+              Measured(signal.guiding_force, FORCES, high)),
     Criterion("B_max", "rail loading |Y| + 0.83 |Q|", "kN", INFORMATION, "loading",
-              Measured(of.rail_loading, FORCES, high)),
+              Measured(signal.rail_loading, FORCES, high)),
     Criterion("B_qst", "quasi-static rail loading", "kN", INFORMATION, "quasi_static",
-              Measured(of.rail_loading, FORCES, middle, curves=True)),
+              Measured(signal.rail_loading, FORCES, middle, curves=True)),
     Criterion("Y_over_Q_inner", "derailment quotient, mean", "-", INFORMATION, "quasi_static",
-              Measured(of.quotient, FORCES, mean_of_known, wheels=INNER, curves=True)),
+              Measured(signal.quotient, FORCES, mean_of_known, wheels=INNER, curves=True)),
     Criterion("T_qst", "quasi-static wear number", "N", INFORMATION, "quasi_static",
-              Measured(of.wear_number, None, middle, curves=True)),
+              Measured(signal.wear_number, None, middle, curves=True)),
     Criterion("overturning", "overturning coefficient, 1.5 Hz", "-", INFORMATION, "safety",
-              Measured(of.load_transfer, (None, 1.5), transferred, outwards=1)),
+              Measured(signal.load_transfer, (None, 1.5), outward_high, outwards=1)),
     Criterion("steering", "steering index", "-", INFORMATION, "quasi_static", steering, BOTH),
 )  # fmt: skip
 CRITERIA = {criterion.name: criterion for criterion in _ROWS}

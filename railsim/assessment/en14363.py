@@ -33,10 +33,10 @@ class SectionValues:
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI; of two percentiles the larger."""
-        about = {name: getattr(self.section, name) for name in ("begin", "end", "radius", "speed")}
-        each = self.values.items()
-        rows = [{"name": name, "place": place, "value": max(x)} for (name, place), x in each]
-        return {**about, "lifted": self.lifted, "quantities": rows}
+        part = {name: getattr(self.section, name) for name in ("begin", "end", "radius", "speed")}
+        items = self.values.items()
+        rows = [{"name": name, "place": place, "value": max(x)} for (name, place), x in items]
+        return {**part, "lifted": self.lifted, "quantities": rows}
 
 
 def section_values(
@@ -54,7 +54,7 @@ def section_values(
     judged. `causal`: Use causal filters, as in a measuring amplifier, instead of zero-phase
     filters. `criteria`: What is measured, by default all.
     """
-    found = []
+    rows = []
     for group in _neighbours(sections):
         signals = Signals(record, group[0].begin, group[-1].end, f0=f0, causal=causal)
         for section in group:
@@ -62,8 +62,8 @@ def section_values(
             for criterion in CRITERIA.values() if criteria is None else criteria:
                 measured = criterion.measure(signals, section)
                 values |= {(criterion.name, place): numbers for place, numbers in measured.items()}
-            found.append(SectionValues(section, values, _lifted(signals, section)))
-    return found
+            rows.append(SectionValues(section, values, _unloaded_lengths(signals, section)))
+    return rows
 
 
 def _neighbours(sections: Sequence[TestSection]) -> list[list[TestSection]]:
@@ -83,17 +83,17 @@ def _neighbours(sections: Sequence[TestSection]) -> list[list[TestSection]]:
     return groups
 
 
-def _lifted(signals: Signals, section: TestSection) -> dict[str, float]:
+def _unloaded_lengths(signals: Signals, section: TestSection) -> dict[str, float]:
     """Length over which each wheel is without load [m]."""
     load = wheel_load(signals, FORCES)
-    found = {}
+    lengths = {}
     for k, (label, side) in enumerate(load.places):
         rows = load.rows(k, section)
         unloaded = load.values[rows, k] <= 0.0
         if unloaded.any():
             metres = np.sum(np.gradient(load.s[rows, k])[unloaded])
-            found[f"{label} {section.wheel(side)}"] = float(metres)
-    return found
+            lengths[f"{label} {section.wheel(side)}"] = float(metres)
+    return lengths
 
 
 def spectrum(x: Floats, rate: float) -> tuple[Floats, Floats]:
@@ -105,12 +105,12 @@ def spectrum(x: Floats, rate: float) -> tuple[Floats, Floats]:
 
 def hunting_spectrum(record: Record, sections: Sequence[TestSection]) -> Floats:
     """Power of the track shift forces of all wheelsets in zones 1 and 2, over `FREQUENCIES`."""
-    found = np.zeros(len(FREQUENCIES))
+    power = np.zeros(len(FREQUENCIES))
     for group in _neighbours([s for s in sections if s.zone in HUNTING_ZONES]):
         rows = record.rows_between(group[0].begin, group[-1].end, 0.0)
         for force in record.result.part("Y", rows).sum(axis=-1).T:
-            found += np.interp(FREQUENCIES, *spectrum(force, record.rate))
-    return found
+            power += np.interp(FREQUENCIES, *spectrum(force, record.rate))
+    return power
 
 
 def hunting_frequency(spectra: Sequence[Floats]) -> float | None:

@@ -29,13 +29,13 @@ class Influence:
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""
-        found = self.regression
+        fit = self.regression
         names = ("constant", "cant_deficiency", "curvature")
         return {
             "population": self.population, "name": self.criterion.name, "place": self.place,
-            "N": found.N, "coefficients": dict(zip(names, found.coefficients, strict=True)),
-            "standard_error": found.error, "determination": found.determination,
-            "radius": RADIUS, "value": found.value,
+            "N": fit.N, "coefficients": dict(zip(names, fit.coefficients, strict=True)),
+            "standard_error": fit.error, "determination": fit.determination,
+            "radius": RADIUS, "value": fit.value,
         }  # fmt: skip
 
 
@@ -47,9 +47,9 @@ def influences(reports: Sequence[ZoneReport], service: Service) -> Iterator[Infl
         curves = [v for v in values if v.section.turn]
         keys = dict.fromkeys(key for value in curves for key in value.values if key[0] in FORCES)
         for name, place in keys:
-            own = [value for value in curves if (name, place) in value.values]
-            x = np.array([[v.section.cant_deficiency, 1.0 / abs(v.section.radius)] for v in own])
-            y = np.array([v.values[name, place][0] for v in own])
-            solved = multiple_regression(x, y, target)
-            if solved is not None:
-                yield Influence(population, place, CRITERIA[name], solved)
+            group = [value for value in curves if (name, place) in value.values]
+            x = np.array([[v.section.cant_deficiency, 1.0 / abs(v.section.radius)] for v in group])
+            y = np.array([v.values[name, place][0] for v in group])
+            fit = multiple_regression(x, y, target)
+            if fit is not None:
+                yield Influence(population, place, CRITERIA[name], fit)

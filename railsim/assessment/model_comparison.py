@@ -178,27 +178,27 @@ class ModelValidation:
     @property
     def verdict(self) -> str:
         """Fail where one quantity fails, pass where all pass."""
-        found = {one.verdict for one in self.comparisons}
-        return FAIL if FAIL in found else PASS if found == {PASS} else INCOMPLETE
+        verdicts = {comparison.verdict for comparison in self.comparisons}
+        return FAIL if FAIL in verdicts else PASS if verdicts == {PASS} else INCOMPLETE
 
     def __getitem__(self, name: str) -> Comparison:
         """Return the comparison of a quantity, by its name in the limits file."""
-        for one in self.comparisons:
-            if one.quantity.name == name:
-                return one
-        known = (one.quantity.name for one in self.comparisons)
-        raise KeyError(f"no quantity '{name}'; {nearest(str(name), known)}")
+        for comparison in self.comparisons:
+            if comparison.quantity.name == name:
+                return comparison
+        names = (comparison.quantity.name for comparison in self.comparisons)
+        raise KeyError(f"no quantity '{name}'; {nearest(str(name), names)}")
 
     def table(self) -> Table:
         """Return mean and standard deviation of the differences against their limits."""
         rows: list[list[object]] = []
-        for one in self.comparisons:
-            c = one.quantity.column
-            mean = Amount(one.mean, c, limit=math.copysign(one.mean_limit, one.mean))
-            scatter = Amount(one.deviation, c, limit=one.limit)
-            amounts = mean, Amount(one.mean_limit, c), scatter, Amount(one.limit, c)
-            rows.append([one.quantity.name, one.quantity.words, c.unit, one.sections,
-                         len(one.pairs), *amounts, one.verdict])  # fmt: skip
+        for c in self.comparisons:
+            column = c.quantity.column
+            mean = Amount(c.mean, column, limit=math.copysign(c.mean_limit, c.mean))
+            scatter = Amount(c.deviation, column, limit=c.limit)
+            amounts = mean, Amount(c.mean_limit, column), scatter, Amount(c.limit, column)
+            rows.append([c.quantity.name, c.quantity.words, column.unit, c.sections,
+                         len(c.pairs), *amounts, c.verdict])  # fmt: skip
         return Table(
             [
                 Column("quantity"), Column("words", " "), Column("unit"),
@@ -213,16 +213,16 @@ class ModelValidation:
     def section_table(self) -> Table:
         """Return all values, measured and simulated, shown in the units of `table`."""
         rows: list[list[object]] = []
-        for one in self.comparisons:
-            c = one.quantity.column
-            for p in one.pairs:
-                values = (Amount(v, c) for v in (p.measured, p.simulated, p.difference))
+        for c in self.comparisons:
+            column = c.quantity.column
+            for p in c.pairs:
+                values = (Amount(v, column) for v in (p.measured, p.simulated, p.difference))
                 radius = p.radius if math.isfinite(p.radius or math.inf) else None  # straight
                 rows.append([p.quantity, p.run, p.place, p.begin, p.end, radius, *values])
         lengths = [Column(name, unit="m", format=".0f") for name in ("begin", "end", "radius")]
-        words = ("measured", "simulated", "difference")
+        names = ("measured", "simulated", "difference")
         return Table(
-            ["quantity", "run", "place", *lengths, *(Column(w, format=".3f") for w in words)], rows
+            ["quantity", "run", "place", *lengths, *(Column(w, format=".3f") for w in names)], rows
         )
 
     def record(self) -> dict[str, Any]:
@@ -232,12 +232,12 @@ class ModelValidation:
             "verdict": self.verdict,
             "quantities": [
                 {
-                    "name": one.quantity.name, "sections": one.sections,
-                    "least_sections": one.least, "values": len(one.pairs), "mean": one.mean,
-                    "mean_limit": one.mean_limit, "standard_deviation": one.deviation,
-                    "limit": one.limit, "verdict": one.verdict,
+                    "name": c.quantity.name, "sections": c.sections,
+                    "least_sections": c.least, "values": len(c.pairs), "mean": c.mean,
+                    "mean_limit": c.mean_limit, "standard_deviation": c.deviation,
+                    "limit": c.limit, "verdict": c.verdict,
                 }
-                for one in self.comparisons
+                for c in self.comparisons
             ],
             "sections": self.section_table().records(), "remarks": list(self.remarks),
         }  # fmt: skip
@@ -250,14 +250,14 @@ class ModelValidation:
         """
         pairs: dict[str, list[Pair]] = {}
         for row in record["sections"]:
-            own = {name: row[name] for name in Pair.__dataclass_fields__}
-            pairs.setdefault(row["quantity"], []).append(Pair(**own))
+            values = {name: row[name] for name in Pair.__dataclass_fields__}
+            pairs.setdefault(row["quantity"], []).append(Pair(**values))
         comparisons = tuple(
             Comparison(
-                QUANTITIES[one["name"]], tuple(pairs[one["name"]]), one["limit"],
-                one["mean_limit"], one["least_sections"],
+                QUANTITIES[row["name"]], tuple(pairs[row["name"]]), row["limit"],
+                row["mean_limit"], row["least_sections"],
             )
-            for one in record["quantities"]
+            for row in record["quantities"]
         )  # fmt: skip
         names = record["vehicle"], tuple(record["runs"])
         return cls(*names, comparisons, (), record["edition"], tuple(record["remarks"]))

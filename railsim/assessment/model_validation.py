@@ -24,7 +24,7 @@ from railsim.assessment.model_comparison import (
     Pair,
 )
 from railsim.assessment.sections import TestSection, section_length, track_sections
-from railsim.assessment.signals import OUTWARDS, Signal, passed
+from railsim.assessment.signals import OUTWARDS, Signal, in_band
 from railsim.definitions.limits import RunningLimits, ValidationLimits
 from railsim.definitions.loading import load, load_running_limits, load_track
 from railsim.definitions.track.definition import Track
@@ -82,51 +82,51 @@ def validate_model(
         Channels that the vehicle or the result does not have; no section; unequal numbers.
     """
     files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
-    found = [results] if isinstance(results, Result) else list(results)
-    if len(found) != len(files) or not files:
-        words = f"{len(found)} results for {len(files)} measured run{'s' * (len(files) != 1)}"
-        raise argument_error("results", words, "one for each", option="RESULT.h5")
+    simulations = [results] if isinstance(results, Result) else list(results)
+    if len(simulations) != len(files) or not files:
+        found = f"{len(simulations)} results for {len(files)} measured run{'s' * (len(files) != 1)}"
+        raise argument_error("results", found, "one for each", option="RESULT.h5")
     runs, limits = inputs(files, limits)
     tests = load_running_limits(zones)
     pairs: list[Pair] = []
     overlays: list[Overlay] = []
     remarks: list[str] = []
     lacking: set[str] = set()
-    for run, result in zip(runs, found, strict=True):
-        one = _Run.of(run, result)
-        overlays += one.overlays()
-        pairs += one.pairs(tests, limits)
-        remarks += one.remarks
-        lacking |= one.lacking
+    for run, result in zip(runs, simulations, strict=True):
+        run_pair = _Run.from_result(run, result)
+        overlays += run_pair.overlays()
+        pairs += run_pair.pairs(tests, limits)
+        remarks += run_pair.remarks
+        lacking |= run_pair.lacking
     if not pairs:
         allowed = "a longer run, or channels of Q, Y or the body's accelerations that change"
         raise input_error(runs[0].name, "no section", allowed, "distance")
-    Q0 = float(np.mean([np.mean(result["Q0"]) for result in found]))
+    Q0 = float(np.mean([np.mean(result["Q0"]) for result in simulations]))
     comparisons = []
     for name, quantity in QUANTITIES.items():
-        own = tuple(pair for pair in pairs if pair.quantity == name)
-        if (own or name in lacking) and name in limits.limits:
+        members = tuple(pair for pair in pairs if pair.quantity == name)
+        if (members or name in lacking) and name in limits.limits:
             limit = limits.limits[name].at(Q0)
             mean, least = limits.mean * limit, limits.sections
-            comparisons.append(Comparison(quantity, own, limit, mean, least))
+            comparisons.append(Comparison(quantity, members, limit, mean, least))
             remarks += comparisons[-1].offsets()
-    if not all(one.checked for one in limits.limits.values()):
+    if not all(limit.checked for limit in limits.limits.values()):
         remarks.append(f"limits of {limits.edition} not checked against the printed standard")
-    said = tuple(dict.fromkeys(remarks))
+    distinct = tuple(dict.fromkeys(remarks))
     names = tuple(run.name for run in runs)
-    results_of = found[0].vehicle().name, names, tuple(comparisons), tuple(overlays)
-    return ModelValidation(*results_of, limits.edition, said)
+    head = simulations[0].vehicle().name, names, tuple(comparisons), tuple(overlays)
+    return ModelValidation(*head, limits.edition, distinct)
 
 
 def inputs(
     measured: Sequence[Measurement | str | Path], limits: ValidationLimits | str | Path
 ) -> tuple[list[Measurement], ValidationLimits]:
     """Return measured runs and limits; raises InputError: what is wrong with them."""
-    runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in measured]
+    runs = [run if isinstance(run, Measurement) else load_measurement(run) for run in measured]
     names = [run.name for run in runs]
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
-        words, allowed = f"two runs named '{twice[0]}'", "a name for each run"
-        raise argument_error("measured", words, allowed, option="MEASURED.toml")
+        found, allowed = f"two runs named '{twice[0]}'", "a name for each run"
+        raise argument_error("measured", found, allowed, option="MEASURED.toml")
     if not isinstance(limits, ValidationLimits):
         limits = load(ValidationLimits, limits)
     unknown = sorted(set(limits.limits) - set(QUANTITIES))
@@ -136,13 +136,13 @@ def inputs(
     return runs, limits
 
 
-def matching(measured: Sequence[Measurement], results: Mapping[str, Result]) -> list[Result]:
+def matched_results(measured: Sequence[Measurement], results: Mapping[str, Result]) -> list[Result]:
     """Return for each measured run the result on its track, at its speed (2 %) and in its load.
 
     `results`: By names, such as those of a study. Raises InputError: runs without a result of this
     kind, or with several.
     """
-    found: list[Result] = []
+    matches: list[Result] = []
     faults = Faults()
     for run in measured:
         name = run.definition.track
@@ -150,47 +150,47 @@ def matching(measured: Sequence[Measurement], results: Mapping[str, Result]) -> 
         speed = float(np.mean(run.speed))
         fits = {n: r for n, r in results.items() if not _contradictions(run, r, track)}
         if len(fits) == 1:
-            found += fits.values()
+            matches += fits.values()
             continue
-        words = f"{len(fits)} results" + (f": {', '.join([*fits][:5])}" if fits else "")
+        found = f"{len(fits)} results" + (f": {', '.join([*fits][:5])}" if fits else "")
         on = "any track" if track is None else f"track '{track.name}'"
         allowed = f"one on {on} at {speed:.1f} m/s in load '{run.definition.load or DESIGN}'; " + (
             "name the file" if fits else f"there are {', '.join([*results][:5]) or 'none'}"
         )
-        faults.append(Fault(run.name, "", words, allowed))
+        faults.append(Fault(run.name, "", found, allowed))
     faults.check()
-    return found
+    return matches
 
 
 def _contradictions(run: Measurement, result: Result, track: Track | None) -> list[str]:
     """Return in what a result is not that of a measured run."""
-    found = []
-    if track is not None and not _alike(result.track(), track):
-        found.append(f"simulated on another track, '{result.track().name}'")
+    contradictions = []
+    if track is not None and not _same_track(result.track(), track):
+        contradictions.append(f"simulated on another track, '{result.track().name}'")
     speed = float(np.mean(run.speed))
     inside = run.part(float(result["distance"][0]), float(result["distance"][-1]))
     if len(inside.speed):
         speed = float(np.mean(inside.speed))
     time, distance = result["time"], result["distance"]
-    own = float((distance[-1] - distance[0]) / (time[-1] - time[0]))
-    if abs(own - speed) > SAME_SPEED * speed:
-        found.append(f"measured at {speed:.1f} m/s, simulated at {own:.1f} m/s")
+    simulated = float((distance[-1] - distance[0]) / (time[-1] - time[0]))
+    if abs(simulated - speed) > SAME_SPEED * speed:
+        contradictions.append(f"measured at {speed:.1f} m/s, simulated at {simulated:.1f} m/s")
     loads = run.definition.load or DESIGN, result.vehicle().load or DESIGN
     if loads[0] != loads[1]:
-        found.append(f"measured in load '{loads[0]}', simulated in '{loads[1]}'")
-    return found
+        contradictions.append(f"measured in load '{loads[0]}', simulated in '{loads[1]}'")
+    return contradictions
 
 
-def _alike(first: Track, second: Track) -> bool:
+def _same_track(first: Track, second: Track) -> bool:
     """Return whether two tracks have one course, one gauge and the same irregularities."""
 
     def course(track: Track) -> list[object]:
-        rows = [one.model_dump() for one in track.irregularities]
+        rows = [irregularity.model_dump() for irregularity in track.irregularities]
         # a file counts by its name: the folder may be another by now
-        named = [
+        by_name = [
             {k: Path(v).name if k == "file" and v else v for k, v in row.items()} for row in rows
         ]
-        return [track.plan, track.cant, track.vertical, track.gauge, named]
+        return [track.plan, track.cant, track.vertical, track.gauge, by_name]
 
     return course(first) == course(second)
 
@@ -226,30 +226,30 @@ class _Run:
     lacking: set[str] = field(default_factory=set)  # quantities that they give no value of
 
     @classmethod
-    def of(cls, run: Measurement, result: Result) -> "_Run":
+    def from_result(cls, run: Measurement, result: Result) -> "_Run":
         check_channels(run.name, run, result.vehicle())
         selections = compared(run)
         time, distance = result["time"], result["distance"]
         rate = (len(time) - 1) / float(time[-1] - time[0])
-        simulated_there, faults = {}, Faults()
+        simulated, faults = {}, Faults()
         for name, selection in selections.items():
             try:
                 values = np.asarray(series(result, selection))
             except KeyError as error:
                 key = f"channels.{name}"
-                words = str(error.args[0])
-                faults.append(Fault(run.name, key, words, "run it with outputs for it"))
+                message = str(error.args[0])
+                faults.append(Fault(run.name, key, message, "run it with outputs for it"))
                 continue
-            simulated_there[name] = amplified(values, rate, run.channel(name))
+            simulated[name] = amplified(values, rate, run.channel(name))
         faults.check()
-        moved, remarks = _placed(run, distance, simulated_there)
+        moved, remarks = _move_to_match(run, distance, simulated)
         on = run.definition.track
-        ended = f"{result.status}, {result.attributes.get('status_reason', '')}".rstrip(", ")
+        ending = f"{result.status}, {result.attributes.get('status_reason', '')}".rstrip(", ")
         if result.status == "derailed":
             allowed = "a model with which the run goes on as the measured one"
-            raise input_error(run.name, f"the simulated run: {ended}", allowed)
+            raise input_error(run.name, f"the simulated run: {ending}", allowed)
         if result.status != "complete":
-            remarks.append(f"simulated up to {distance[-1]:.0f} m only ({ended})")
+            remarks.append(f"simulated up to {distance[-1]:.0f} m only ({ending})")
         remarks += _contradictions(run, result, None if on is None else load_track(on))
         begin = float(np.interp(time[0] + START, time, distance))
         part = moved.part(begin, float(distance[-1]))
@@ -265,13 +265,13 @@ class _Run:
         rising = np.concatenate([[True], np.diff(distance) > 0.0])
         row, channels = np.arange(len(part.time)), []
         for name, selection in selections.items():
-            known = ~np.isnan(part[name])
+            valid = ~np.isnan(part[name])
             measured = np.zeros(len(row))
-            if known.any():
-                measured = np.interp(row, row[known], part[name][known])
-            x = _at(part.distance, distance[rising], simulated_there[name][rising])
-            where = _ahead(result, selection)
-            channels.append(_Channel(name, selection, where, measured, x, ~known))
+            if valid.any():
+                measured = np.interp(row, row[valid], part[name][valid])
+            x = _interpolate(part.distance, distance[rising], simulated[name][rising])
+            ahead = _ahead(result, selection)
+            channels.append(_Channel(name, selection, ahead, measured, x, ~valid))
         every = max(1, round(part.rate / LIKE))
 
         def thin(x: Floats) -> Floats:
@@ -280,29 +280,29 @@ class _Run:
         measured_thin = {channel.name: thin(channel.measured) for channel in channels}
         simulated_thin = {channel.name: thin(channel.simulated) for channel in channels}
         remarks += suspicions(measured_thin, simulated_thin, selections, every / part.rate)
-        said = [f"{run.name}: {words}" for words in (*run.remarks, *remarks)]
-        return cls(part, result, channels, said)
+        sentences = [f"{run.name}: {message}" for message in (*run.remarks, *remarks)]
+        return cls(part, result, channels, sentences)
 
     def overlays(self) -> Iterator[Overlay]:
         run = self.measurement
-        for one in self.channels:
-            read, made = (passed(x, run.rate, FORCES) for x in (one.measured, one.simulated))
-            read = np.where(one.unknown, np.nan, read)
-            about = run.name, one.name, one.quantity, run.distance, run.rate
-            yield Overlay(*about, read, made)
+        for c in self.channels:
+            measured, simulated = (in_band(x, run.rate, FORCES) for x in (c.measured, c.simulated))
+            measured = np.where(c.unknown, np.nan, measured)
+            head = run.name, c.name, c.quantity, run.distance, run.rate
+            yield Overlay(*head, measured, simulated)
 
     def pairs(self, tests: RunningLimits, limits: ValidationLimits) -> list[Pair]:
         run, track = self.measurement, self.result.track()
         s, ahead = run.distance, [channel.ahead for channel in self.channels]
         covered = float(s[0]) + max(0.0, *ahead), float(s[-1]) + min(0.0, *ahead)
 
-        def speed_at(at: float) -> float:
-            return float(np.interp(at, s, run.speed))
+        def speed_at(distance: float) -> float:
+            return float(np.interp(distance, s, run.speed))
 
         service = self.result.vehicle().service or SERVICE
-        judged = [one for one in QUANTITIES.values() if one.name in limits.limits]
-        places = {quantity.name: [*self._places(quantity)] for quantity in judged}
-        found: list[Pair] = []
+        quantities = [q for q in QUANTITIES.values() if q.name in limits.limits]
+        places = {quantity.name: [*self._places(quantity)] for quantity in quantities}
+        pairs: list[Pair] = []
         number = 0
         for section in track_sections(track, tests, service, covered, speed_at):
             if not section.zone:
@@ -312,50 +312,50 @@ class _Run:
                 continue
             number += 1
             section = replace(section, zone="")  # very large radii are compared as curves
-            for quantity in judged:
+            for quantity in quantities:
                 if section.turn or not quantity.curves:
                     for place in places[quantity.name]:
-                        found += self._in_section(quantity, section, place)
+                        pairs += self._in_section(quantity, section, place)
         self.remarks += [
             f"{run.name}: {name} does not change in {len(begins)} of {number} sections: a dead "
             "sensor? It is left out there."
             for name, begins in self.resting.items()
         ]
-        return found
+        return pairs
 
     def _places(self, quantity: Compared) -> Iterator[_Place]:
         """Return a quantity at all places where it, or what it follows from, was measured."""
-        by = {channel.quantity: channel for channel in self.channels}
+        channels = {channel.quantity: channel for channel in self.channels}
         base = quantity.base
-        for selection, channel in by.items():
+        for selection, channel in channels.items():
             kind, *labels = selection.split(":")
-            used, side = [channel], None
+            parts, side = [channel], None
             if kind == base:
                 side = SIDES.index(labels[1]) if len(labels) > 1 else None
-            elif base == "Y_over_Q" and kind == "Y" and f"Q:{labels[0]}:{labels[1]}" in by:
-                if f"{base}:{labels[0]}:{labels[1]}" in by:
+            elif base == "Y_over_Q" and kind == "Y" and f"Q:{labels[0]}:{labels[1]}" in channels:
+                if f"{base}:{labels[0]}:{labels[1]}" in channels:
                     continue
                 side = SIDES.index(labels[1])
-                used.append(by[f"Q:{labels[0]}:{labels[1]}"])
+                parts.append(channels[f"Q:{labels[0]}:{labels[1]}"])
             elif base == "sum_Y" and kind == "Y" and labels[1] == "left":
-                if f"Y:{labels[0]}:right" not in by or f"sum_Y:{labels[0]}" in by:
+                if f"Y:{labels[0]}:right" not in channels or f"sum_Y:{labels[0]}" in channels:
                     continue
-                used.append(by[f"Y:{labels[0]}:right"])
+                parts.append(channels[f"Y:{labels[0]}:right"])
             elif kind != "sensor_acceleration" or not _on_floor(base, *labels):
                 continue
             label = labels[0] if base.startswith("body") else f"wheelset {labels[0]}"
             s = self.measurement.distance + channel.ahead
-            sources = [[c.measured for c in used], [c.simulated for c in used]]
-            formed = [_formed(quantity, self.measurement.rate, x, side) for x in sources]
-            both = [Signal(x[:, None], s[:, None], [(label, side)]) for x in formed]
-            yield _Place(used, both)
+            sources = [[c.measured for c in parts], [c.simulated for c in parts]]
+            values = [_combine(quantity, self.measurement.rate, x, side) for x in sources]
+            signals = [Signal(x[:, None], s[:, None], [(label, side)]) for x in values]
+            yield _Place(parts, signals)
 
     def _in_section(self, quantity: Compared, section: TestSection, place: _Place) -> list[Pair]:
         """Return the values of a quantity at a place in a section."""
-        channels, both = place
-        ((label, side),) = both[0].places
+        channels, signals = place
+        ((label, side),) = signals[0].places
         wheel = section.wheel(side)
-        inside = slice(*np.searchsorted(both[0].s[:, 0], [section.begin, section.end]))
+        inside = slice(*np.searchsorted(signals[0].s[:, 0], [section.begin, section.end]))
         gaps = (np.mean(channel.unknown[inside]) for channel in channels)
         if (wheel == "inner" and quantity.base != "Q") or any(gap > UNKNOWN for gap in gaps):
             return []
@@ -366,21 +366,21 @@ class _Run:
             self.lacking.add(quantity.name)
             return []
         outwards, values = RIGHT.get(quantity.base, 0) * section.turn or 1.0, []
-        for signal in both:
+        for signal in signals:
             x = outwards * signal.in_section(0, section, quantity.window)
             values.append(quantity.value(x, section.turn) if len(x) else [])
-        names_of = quantity.name, self.measurement.name, f"{label} {wheel}".rstrip()
-        where = section.begin, section.end, section.radius
+        head = quantity.name, self.measurement.name, f"{label} {wheel}".rstrip()
+        ends = section.begin, section.end, section.radius
         if not np.isfinite(np.concatenate(values)).all():
             self.remarks.append(
-                f"{self.measurement.name}: no {quantity.name} of {names_of[2]} from "
+                f"{self.measurement.name}: no {quantity.name} of {head[2]} from "
                 f"{section.begin:.0f} to {section.end:.0f} m: a wheel without load"
             )
             return []
-        return [Pair(*names_of, *where, m, v) for m, v in zip(*values, strict=False)]
+        return [Pair(*head, *ends, m, v) for m, v in zip(*values, strict=False)]
 
 
-def _at(places: Floats, s: Floats, x: Floats) -> Floats:
+def _interpolate(places: Floats, s: Floats, x: Floats) -> Floats:
     """Values at other places, by a cubic spline: a straight line takes 4 % of 18 Hz at 200 1/s."""
     from scipy.interpolate import CubicSpline
 
@@ -393,9 +393,9 @@ def _on_floor(base: str, sensor: str, axis: str) -> bool:
     return base == f"body{axis}" and not sensor.startswith(("frame", "axlebox"))
 
 
-def _formed(quantity: Compared, rate: float, channels: list[Floats], side: int | None) -> Floats:
+def _combine(quantity: Compared, rate: float, channels: list[Floats], side: int | None) -> Floats:
     """Return a quantity over time, of a wheel outwards positive, of one channel or two."""
-    first, *second = [passed(x, rate, quantity.band) for x in channels]
+    first, *second = [in_band(x, rate, quantity.band) for x in channels]
     outwards = 1.0 if side is None else float(OUTWARDS[side])
     if quantity.base == "Y":
         return outwards * first
@@ -418,7 +418,7 @@ def _ahead(result: Result, selection: str) -> float:
     return flat.along(flat.of_kind("wheelset"))[k]
 
 
-def _placed(
+def _move_to_match(
     run: Measurement, distance: Floats, simulated: Mapping[str, Floats]
 ) -> tuple[Measurement, list[str]]:
     """Return a run with its arc length moved to match the simulation, and what was done."""
@@ -427,8 +427,8 @@ def _placed(
     if best is None:
         found = f"no channel is like the simulated one at places within {MOST_SHIFT:g} m"
         return run, [f"{found}: the place on the track is not checked"]
-    words = []
+    remarks = []
     if abs(best.shift) > 1.0 or abs(best.stretch) > 1e-3:
-        words = [f"arc length moved by {best.shift:+.1f} m and {1e3 * best.stretch:+.2f} m/km "
+        remarks = [f"arc length moved by {best.shift:+.1f} m and {1e3 * best.stretch:+.2f} m/km "
                  "to match the simulation"]  # fmt: skip
-    return run.moved(best.shift, best.stretch), words
+    return run.moved(best.shift, best.stretch), remarks

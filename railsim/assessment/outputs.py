@@ -13,8 +13,8 @@ LEAST = LEAST_RATE["zero"] * record.WIDE_ENOUGH
 
 def coarse_remarks(settings: Settings, speed: float) -> tuple[str, ...]:
     """Say in what the values of a run are too coarse to be judged, if they are."""
-    words, loss = record.coarseness(settings, 1.0 / settings.output_interval(speed))
-    return (f"{words}: {loss}",) if words else ()
+    coarseness, loss = record.coarseness(settings, 1.0 / settings.output_interval(speed))
+    return (f"{coarseness}: {loss}",) if coarseness else ()
 
 
 def check_outputs(
@@ -26,12 +26,12 @@ def check_outputs(
     nothing left to pass.
     """
     faults, outputs, filters = Faults(), settings.outputs, standard in (*record.RUNNING, "comfort")
-    kept = outputs.quantities or ("*",)
+    recorded = outputs.quantities or ("*",)
     needed = {record.NEEDED[standard]: f"with {', '.join(record.NEEDED[standard])}"}
     if standard == "comfort" and not outputs.sensors:
         needed[record.MOTION] = "with them, or settings.outputs.sensors=true"
     for names, allowed in needed.items():
-        if lacking := [name for name in names if not matches(name, kept)]:
+        if lacking := [name for name in names if not matches(name, recorded)]:
             found = f"without {', '.join(lacking)}"
             faults.append(Fault("settings", "outputs.quantities", found, allowed))
     rate = 1.0 / settings.output_interval(speed)

@@ -53,18 +53,18 @@ class _Readings:
     acceleration: Floats  # see `Record.readings`
     roll: Floats  # see `Record.readings`
 
-    def part_of(self, rows: slice, speed: Floats) -> "_Readings | None":
+    def overlap(self, rows: slice, speed: Floats) -> "_Readings | None":
         """Return what of these is part of other rows with their speeds, if anything is.
 
         Of both parts without the first and the last row, whose speeds are of one side.
         """
         begin = max(self.first, rows.start) + 1
         end = min(self.first + len(self.speed), rows.stop) - 1
-        own = slice(begin - self.first, end - self.first)
+        part = slice(begin - self.first, end - self.first)
         same = slice(begin - rows.start, end - rows.start)
-        if begin >= end or not np.array_equal(self.speed[own], speed[same]):
+        if begin >= end or not np.array_equal(self.speed[part], speed[same]):
             return None
-        return _Readings(begin, self.speed[own], self.acceleration[own], self.roll[own])
+        return _Readings(begin, self.speed[part], self.acceleration[part], self.roll[part])
 
 
 def coarseness(settings: Settings, rate: float) -> tuple[str, str]:
@@ -134,10 +134,10 @@ class Record:
 
     def part(self, name: str, rows: slice) -> Floats:
         """Some rows of a quantity; InputError where a value is none, such as of a broken file."""
-        found = self.result.part(name, rows)
-        if not np.isfinite(found).all():
+        values = self.result.part(name, rows)
+        if not np.isfinite(values).all():
             raise self.fault(name, "holds values that are no numbers", "a result without")
-        return found
+        return values
 
     @cached_property
     def alignment(self) -> Alignment:
@@ -155,10 +155,10 @@ class Record:
         from railsim.contact.geometry import geometry_of
 
         wheelset = flatten(self.result.vehicle()).of_kind("wheelset")[0].wheelset
-        track, known = self.result.track(), self.result.profiles
-        if wheelset is None or not {*wheelset.profile, *track.rail} <= known.keys():
+        track, profiles = self.result.track(), self.result.profiles
+        if wheelset is None or not {*wheelset.profile, *track.rail} <= profiles.keys():
             return None
-        return geometry_of(wheelset, track, known, widening)
+        return geometry_of(wheelset, track, profiles, widening)
 
     @cached_property
     def conicity(self) -> float:
@@ -174,20 +174,20 @@ class Record:
     @cached_property
     def bogies(self) -> dict[str, list[int]]:
         """Numbers of the wheelsets of each bogie."""
-        found: dict[str, list[int]] = {}
+        bogies: dict[str, list[int]] = {}
         flat = flatten(self.result.vehicle())
         for w, wheelset in enumerate(flat.of_kind("wheelset")):
-            found.setdefault(bogie_name(flat, wheelset), []).append(w)
-        return found
+            bogies.setdefault(bogie_name(flat, wheelset), []).append(w)
+        return bogies
 
     @cached_property
     def sensors(self) -> Mapping[str, Sensor]:
         """Sensors whose readings are available, by name."""
-        known = sensors(self.result.vehicle())
+        every = sensors(self.result.vehicle())
         if "sensor_acceleration" in self.result:
-            return {n: known[n] for n in self.result.coordinates["sensor"] if n in known}
+            return {n: every[n] for n in self.result.coordinates["sensor"] if n in every}
         bodies = self.result.bodies if all(name in self.result for name in MOTION) else ()
-        return {name: sensor for name, sensor in known.items() if sensor.body in bodies}
+        return {name: sensor for name, sensor in every.items() if sensor.body in bodies}
 
     @cached_property
     def _speed(self) -> Floats:
@@ -206,21 +206,21 @@ class Record:
             acceleration = self.part("sensor_acceleration", rows)[:, order]
             return acceleration, self.part("sensor_roll_rate", rows)[:, order]
         speed = self._speed[rows]
-        known = self._last and self._last.part_of(rows, speed)
-        if known is None:
-            found = self._of_motion(rows, speed)
+        previous = self._last and self._last.overlap(rows, speed)
+        if previous is None:
+            values = self._readings_of_motion(rows, speed)
         else:
-            begin, end = known.first, known.first + len(known.speed)
+            begin, end = previous.first, previous.first + len(previous.speed)
             before, after = slice(rows.start, begin), slice(end, rows.stop)
-            first = self._of_motion(before, speed[: begin - rows.start])
-            last = self._of_motion(after, speed[end - rows.start :])
-            each = zip(first, (known.acceleration, known.roll), last, strict=True)
-            acceleration, roll = map(np.concatenate, each)
-            found = acceleration, roll
-        self._last = _Readings(rows.start, speed, *found)
-        return found
+            first = self._readings_of_motion(before, speed[: begin - rows.start])
+            last = self._readings_of_motion(after, speed[end - rows.start :])
+            parts = zip(first, (previous.acceleration, previous.roll), last, strict=True)
+            acceleration, roll = map(np.concatenate, parts)
+            values = acceleration, roll
+        self._last = _Readings(rows.start, speed, *values)
+        return values
 
-    def _of_motion(self, rows: slice, speed: Floats) -> tuple[Floats, Floats]:
+    def _readings_of_motion(self, rows: slice, speed: Floats) -> tuple[Floats, Floats]:
         """Readings from the motion of the bodies."""
         motion = {name: self.part(name, rows) for name in MOTION}
         motion["distance"] = self.distance[rows]
@@ -261,7 +261,7 @@ class Record:
 
     def remarks(self) -> list[str]:
         """Notes on the record for the reader of the assessment."""
-        found = [f"{self.name}: {one}" for one in self.result.remarks]
+        remarks = [f"{self.name}: {remark}" for remark in self.result.remarks]
         if self.coarse:
-            found.append(f"{self.name}: {self.coarse}: {self._loss}")
-        return found
+            remarks.append(f"{self.name}: {self.coarse}: {self._loss}")
+        return remarks

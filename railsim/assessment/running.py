@@ -81,11 +81,11 @@ def _kind(result: Result) -> tuple[str, ...]:
 def _populations(runs: Mapping[str, Result]) -> dict[str, str]:
     """Name of each run's population: what differs between the runs, and the condition."""
     kinds = {name: _kind(result) for name, result in runs.items()}
-    several = {k for k in range(5) if len({kind[k] for kind in kinds.values()}) > 1}
+    differing = {k for k in range(5) if len({kind[k] for kind in kinds.values()}) > 1}
     if len({kind[0] for kind in kinds.values()}) == len({kind[:2] for kind in kinds.values()}):
-        several -= {1}  # the condition says which load it is
-    shown = sorted({0, *several})
-    return {name: ", ".join(filter(None, (kind[k] for k in shown))) for name, kind in kinds.items()}
+        differing -= {1}  # the condition says which load it is
+    keys = sorted({0, *differing})
+    return {name: ", ".join(filter(None, (kind[k] for k in keys))) for name, kind in kinds.items()}
 
 
 def assess_running(
@@ -107,11 +107,11 @@ def assess_running(
     run.
     """
     limits = running_limits(standard, file)
-    own = _own_sections(sections, runs) if sections else None
+    section_file = _load_section_file(sections, runs) if sections else None
     service = service or _service(runs)
-    words = f"no '{service.category}'", "the vehicle's category"
+    fault = f"no '{service.category}'", "the vehicle's category"
     Faults(
-        Fault(str(file or standard), f"limits.{name}.k1", *words)
+        Fault(str(file or standard), f"limits.{name}.k1", *fault)
         for name, law in limits.limits.items()
         if isinstance(law, ByAxleLoad) and service.category not in law.k1
     ).check()
@@ -120,7 +120,7 @@ def assess_running(
     for name, result in runs.items():
         if result.status == "complete":
             record = Record(result, name, coarse=coarse)
-            cut = _sections(record, limits, service, own)
+            cut = _sections(record, limits, service, section_file)
             counting = [s for s in cut if s.zone and (all_sections or not s.reason)]
             done.append(_Run(record, populations[name], cut, counting))
     if done and not any(run.sections for run in done):
@@ -138,14 +138,14 @@ def assess_running(
         result = members[0].record.result
         population = Population(name, result.vehicle(), result["Q0"])
         values = [v for run in members for v in run.values]
-        of_all = [s for run in members for s in run.sections]
-        reports = zone_reports(population, values, of_all, service, limits, method)
+        every_section = [s for run in members for s in run.sections]
+        reports = zone_reports(population, values, every_section, service, limits, method)
         zones += reports
-        outside = [s for s in of_all if not s.zone]
+        outside = [s for s in every_section if not s.zone]
         conditions += missing_zones(population, reports, limits, outside)
         for report in reports if not population.fault else ():
-            there = [r for r in counted if r.section.zone == report.zone and r.population == name]
-            conditions += zone_conditions(report, there, limits, service)
+            in_zone = [r for r in counted if r.section.zone == report.zone and r.population == name]
+            conditions += zone_conditions(report, in_zone, limits, service)
     results = [run.record.result for run in done]
     if done:
         conditions += vehicle_conditions(zones, counted, results, limits, service)
@@ -154,7 +154,7 @@ def assess_running(
         next(iter(runs.values())).vehicle().name, standard, tuple(runs),
         overall(verdicts, limits.deciding), verdicts, tuple(zones), tuple(conditions), tuple(rows),
         f0, tuple(influences(zones, service)), remarks=_remarks(done, zones, limits), limits=limits,
-        transitions={run.record.name: _on_transitions(run, method, causal=causal) for run in done},
+        transitions={run.record.name: _transitions(run, method, causal=causal) for run in done},
     )  # fmt: skip
 
 
@@ -166,21 +166,21 @@ def running_limits(standard: str, file: str | Path | None) -> RunningLimits:
     """
     file = file or standard
     limits = load_running_limits(file)
-    needed = [name for name, one in CRITERIA.items() if one.group != INFORMATION]
-    found = {
+    needed = [name for name, criterion in CRITERIA.items() if criterion.group != INFORMATION]
+    problems = {
         n: ("unknown quantity", nearest(n, CRITERIA)) for n in limits.limits if n not in CRITERIA
     }
-    found |= {n: ("missing", "needed for its verdict") for n in needed if n not in limits.limits}
-    if found:
-        faults = (Fault(str(file), f"limits.{name}", *words) for name, words in found.items())
+    problems |= {n: ("missing", "needed for its verdict") for n in needed if n not in limits.limits}
+    if problems:
+        faults = (Fault(str(file), f"limits.{name}", *found) for name, found in problems.items())
         raise InputError(faults)
     if limits.standard != standard:
         raise input_error(file, repr(limits.standard), f"wanted: '{standard}'", "standard")
     return limits
 
 
-def common_service(runs: Mapping[str, Result], given: Collection[str] = ()) -> Service | None:
-    """Service table of a vehicle; its conditions may differ in what is `given` otherwise.
+def common_service(runs: Mapping[str, Result], overridden: Collection[str] = ()) -> Service | None:
+    """Service table of a vehicle; its conditions may differ in what is `overridden`.
 
     Raises InputError: they differ in something else that limits depend on.
     """
@@ -189,8 +189,8 @@ def common_service(runs: Mapping[str, Result], given: Collection[str] = ()) -> S
     differing = {
         key: values
         for key in OF_LIMITS
-        if key not in given
-        and len(values := {getattr(one, key, None) for one in services.values()}) > 1
+        if key not in overridden
+        and len(values := {getattr(s, key, None) for s in services.values()}) > 1
     }
     if differing:
         allowed = "the same in all conditions, or give one as an option"
@@ -213,47 +213,47 @@ def _service(runs: Mapping[str, Result]) -> Service:
     return service
 
 
-def _own_sections(file: str | Path, runs: Mapping[str, Result]) -> tuple[str, OwnSections]:
+def _load_section_file(file: str | Path, runs: Mapping[str, Result]) -> tuple[str, OwnSections]:
     """Return a file of sections, each on the track of a run."""
-    own, tracks = load_own_sections(file), {result.track().name for result in runs.values()}
+    listed, tracks = load_own_sections(file), {result.track().name for result in runs.values()}
     Faults(
-        Fault(str(file), f"sections.{k}.track", f"'{one.track}'", nearest(one.track, tracks))
-        for k, one in enumerate(own.sections)
-        if one.track and one.track not in tracks
+        Fault(str(file), f"sections.{k}.track", f"'{s.track}'", nearest(s.track, tracks))
+        for k, s in enumerate(listed.sections)
+        if s.track and s.track not in tracks
     ).check()
-    return str(file), own
+    return str(file), listed
 
 
 def _sections(
-    record: Record, limits: RunningLimits, service: Service, own: tuple[str, OwnSections] | None
+    record: Record, limits: RunningLimits, service: Service, listed: tuple[str, OwnSections] | None
 ) -> list[TestSection]:
     """Return the sections of a run; raises InputError where it lacks a quantity, or one of these.
 
-    `own`: Those of a file of the user's own, in place of those cut from the track.
+    `listed`: Those of a file of the user's own, in place of those cut from the track.
     """
     record.need_quantities(limits.standard)
     if "Q0" not in record.result:
         raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
     covered, track = record.covered(), record.result.track()
-    if own is None:
+    if listed is None:
         return track_sections(track, limits, service, covered, record.speed_at)
-    file, given = own[0], own[1].sections
-    there = [(k, one) for k, one in enumerate(given) if one.track in (None, track.name)]
+    file, sections = listed[0], listed[1].sections
+    on_track = [(k, s) for k, s in enumerate(sections) if s.track in (None, track.name)]
     most = f"{math.ceil(covered[0])} to {math.floor(covered[1])} m"
     allowed = f"within {most}, where all of the vehicle was in the run {record.name}"
     Faults(
-        Fault(file, f"sections.{k}", f"{one.begin:g} to {one.end:g} m", allowed)
-        for k, one in there
-        if one.begin < covered[0] or one.end > covered[1]
+        Fault(file, f"sections.{k}", f"{s.begin:g} to {s.end:g} m", allowed)
+        for k, s in on_track
+        if s.begin < covered[0] or s.end > covered[1]
     ).check()
-    return own_sections(track, limits, service, [one for _, one in there], record.speed_at)
+    return own_sections(track, limits, service, [s for _, s in on_track], record.speed_at)
 
 
-def _on_transitions(run: _Run, method: str, *, causal: bool) -> list[SectionValues]:
+def _transitions(run: _Run, method: str, *, causal: bool) -> list[SectionValues]:
     record = run.record
     parts = transitions(record.result.track(), record.covered(), record.speed_at)
-    criteria = [one for one in CRITERIA.values() if method in one.methods and one.kind in DYNAMIC]
-    criteria = [one for one in criteria if one.group in DYNAMIC]
+    criteria = [c for c in CRITERIA.values() if method in c.methods and c.kind in DYNAMIC]
+    criteria = [c for c in criteria if c.group in DYNAMIC]
     return section_values(record, parts, causal=causal, criteria=criteria)
 
 
@@ -271,22 +271,22 @@ def _section_rows(run: _Run, service: Service) -> Iterator[SectionRow]:
         speed = min(s.speed, service.admissible_speed)
         name = quality_class(speed, alignment, level)
         further = quality.further(s.begin, s.end, speed) if quality else {}
-        found = alignment, level, name, conicity, realisation, s in run.counting, further
-        yield SectionRow(run.record.name, run.population, s, *found)
+        values = alignment, level, name, conicity, realisation, s in run.counting, further
+        yield SectionRow(run.record.name, run.population, s, *values)
 
 
 def _remarks(
     done: Sequence[_Run], zones: Sequence[ZoneReport], limits: RunningLimits
 ) -> tuple[str, ...]:
-    found = [f"{LEFT_OUT}{run.record.name}: has no section" for run in done if not run.sections]
-    found += [remark for run in done for remark in run.record.remarks()]
-    found += [
+    remarks = [f"{LEFT_OUT}{run.record.name}: has no section" for run in done if not run.sections]
+    remarks += [remark for run in done for remark in run.record.remarks()]
+    remarks += [
         f"{run.record.name}: section {s.begin:.0f} to {s.end:.0f} m outside all zones: {s.reason}"
         for run in done
         for s in run.sections
         if not s.zone
     ]
-    found += [remark for zone in zones for remark in zone.undecided]
+    remarks += [remark for zone in zones for remark in zone.undecided]
     if not all(row.checked for zone in zones for row in zone.rows):
-        found.append(f"limits of {limits.edition} not checked against the printed standard")
-    return tuple(dict.fromkeys(found))
+        remarks.append(f"limits of {limits.edition} not checked against the printed standard")
+    return tuple(dict.fromkeys(remarks))

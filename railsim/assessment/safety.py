@@ -40,16 +40,16 @@ def flange_angle(profile: Profile) -> float:
     """
     y, z = np.asarray(profile.y), np.asarray(profile.z)
     along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
-    at = np.arange(0.0, along[-1], 0.25e-3)
-    py, pz = np.interp(at, along, y), np.interp(at, along, z)
+    points = np.arange(0.0, along[-1], 0.25e-3)
+    py, pz = np.interp(points, along, y), np.interp(points, along, z)
     span = 4  # of 0.25 mm
     angles = np.arctan2(np.abs(pz[span:] - pz[:-span]), np.abs(py[span:] - py[:-span]))
     # the flange back is vertical: search between the tip of the flange and the tread
     tip = int(np.argmax(pz))
-    middle = 0.5 * (at[span:] + at[:-span])
+    middle = 0.5 * (points[span:] + points[:-span])
     order = np.argsort(y)
     tread = float(np.interp(0.0, y[order], along[order]))
-    face = (middle > min(at[tip], tread)) & (middle < max(at[tip], tread))
+    face = (middle > min(points[tip], tread)) & (middle < max(points[tip], tread))
     return float(np.max(angles[face]))
 
 
@@ -152,11 +152,11 @@ def safety_report(record: Record) -> SafetyReport:
             climb = climb_distance(s[:, w], quotient[:, w, k], limit, height)
             unloaded = np.isnan(quotient[:, w, k])
             nearest = int(np.argmax(np.where(unloaded, -np.inf, quotient[:, w, k] / limit)))
-            there = float(limit[nearest]), float(quotient[nearest, w, k])
-            own = f"wheelset {w + 1} {side}", *there, climb.length, climb.begin, climb.rise
-            wheels.append(WheelSafety(*own, bool(unloaded.any())))
+            worst = float(limit[nearest]), float(quotient[nearest, w, k])
+            values = f"wheelset {w + 1} {side}", *worst, climb.length, climb.begin, climb.rise
+            wheels.append(WheelSafety(*values, bool(unloaded.any())))
     Q = result["Q"][rows]
-    most = {name: largest_overturning(Q[:, own]) for name, own in record.bogies.items()}
+    most = {name: largest_overturning(Q[:, members]) for name, members in record.bogies.items()}
     return SafetyReport(tuple(wheels), most, result.status == "derailed")
 
 

@@ -84,8 +84,8 @@ def track_sections(
     `covered`: Range of arc length that the whole vehicle covered [m]. `speed_at`: Speed at an arc
     length [m/s].
     """
-    found: list[TestSection] = []
-    for begin, end, radius, cant in _constant(track):
+    cut: list[TestSection] = []
+    for begin, end, radius, cant in _constant_parts(track):
         begin, end = max(begin, covered[0]), min(end, covered[1])
         if begin >= end:
             continue
@@ -99,14 +99,14 @@ def track_sections(
             shape = "straight" if math.isinf(radius) else f"curve of {abs(radius):.6g} m"
             found_length = beside(end - begin, length)
             reason = f"{found_length} m of a {shape}, a section needs {length:.0f} m"
-            found.append(TestSection(zone, begin, end, radius, deficiency, speed, reason))
+            cut.append(TestSection(zone, begin, end, radius, deficiency, speed, reason))
         for number in range(whole):
             first = begin + number * length
             speed = speed_at(first + 0.5 * length)
             deficiency = outer_deficiency(speed, radius, cant)
             why = reason or _outside(limits.zones[zone], radius, deficiency, speed, service)
-            found.append(TestSection(zone, first, first + length, radius, deficiency, speed, why))
-    return found
+            cut.append(TestSection(zone, first, first + length, radius, deficiency, speed, why))
+    return cut
 
 
 def transitions(
@@ -118,54 +118,54 @@ def transitions(
     opposite hands, where neither wheel is the outer one; kinks that are rounded only are left out.
     Arguments as of `track_sections`.
     """
-    found = []
-    for (_, begin, before, _), (end, _, after, _) in pairwise(_constant(track)):
+    sections = []
+    for (_, begin, before, _), (end, _, after, _) in pairwise(_constant_parts(track)):
         least = max(track.rounding + 1e-6, SHORTEST)
         if covered[0] <= begin < end - least and end <= covered[1]:
             opposite = 1.0 / before / after < 0.0
             radius = math.inf if opposite else min(before, after, key=abs)
             speed = speed_at(0.5 * (begin + end))
-            found.append(TestSection("", begin, end, radius, math.nan, speed, "transition"))
-    return found
+            sections.append(TestSection("", begin, end, radius, math.nan, speed, "transition"))
+    return sections
 
 
 def own_sections(
     track: Track,
     limits: RunningLimits,
     service: Service,
-    given: Sequence[OwnSection],
+    listed: Sequence[OwnSection],
     speed_at: Callable[[float], float],
 ) -> list[TestSection]:
     """Sections that the user gives, with their reasons; arguments as of `track_sections`.
 
     Radius and cant are those of the part of constant curvature and cant that holds most of one.
     """
-    parts, found = _constant(track) or [(0.0, 0.0, math.inf, 0.0)], []
-    for one in sorted(given, key=lambda one: one.begin):
+    parts, sections = _constant_parts(track) or [(0.0, 0.0, math.inf, 0.0)], []
+    for section in sorted(listed, key=lambda section: section.begin):
         begin, end, radius, cant = max(
-            parts, key=lambda part: min(one.end, part[1]) - max(one.begin, part[0])
+            parts, key=lambda part: min(section.end, part[1]) - max(section.begin, part[0])
         )
-        speed, why = speed_at(0.5 * (one.begin + one.end)), []
+        speed, why = speed_at(0.5 * (section.begin + section.end)), []
         deficiency = outer_deficiency(speed, radius, cant)
-        own = zone_of(radius, deficiency, limits)
-        name = (one.zone or own) if begin < one.end and one.begin < end else ""
+        fitting = zone_of(radius, deficiency, limits)
+        name = (section.zone or fitting) if begin < section.end and section.begin < end else ""
         zone = limits.zones.get(name)
         if zone and zone.radius and math.isinf(radius):  # neither wheel is the outer one
             zone, why = None, [f"given as of zone {name}, but straight"]
-        elif not begin - ROUNDING <= one.begin < one.end <= end + ROUNDING:
+        elif not begin - ROUNDING <= section.begin < section.end <= end + ROUNDING:
             why = [f"not within {begin:.0f} to {end:.0f} m of constant curvature and cant"]
         elif zone is None:
             why = [f"no zone has the radius {abs(radius):.6g} m"]
         low, high = (zone.radius if zone else None) or (math.inf, math.inf)
-        if zone and name != own and not low <= abs(radius) <= high:
+        if zone and name != fitting and not low <= abs(radius) <= high:
             why.append(f"given as of zone {name}, the radius of {abs(radius):.6g} m is not")
         why += [_outside(zone, radius, deficiency, speed, service)] if zone else []
-        about = radius, deficiency, speed, "; ".join(filter(None, why))
-        found.append(TestSection(name if zone else "", one.begin, one.end, *about))
-    return found
+        values = radius, deficiency, speed, "; ".join(filter(None, why))
+        sections.append(TestSection(name if zone else "", section.begin, section.end, *values))
+    return sections
 
 
-def _constant(track: Track) -> list[tuple[float, float, float, float]]:
+def _constant_parts(track: Track) -> list[tuple[float, float, float, float]]:
     """Parts with constant curvature and cant: begin, end, radius, cant."""
     plan, cants = curvature_sections(track), cant_sections(track)
     last = plan[-1].end
@@ -174,17 +174,17 @@ def _constant(track: Track) -> list[tuple[float, float, float, float]]:
     elif cants[-1].end < last:
         value = cants[-1].end_value
         cants = [*cants, Section("", "CST", cants[-1].end, last, value, value)]
-    found, half = [], 0.5 * track.rounding
-    for element, cant in product(_joined(plan), _joined(cants)):
+    parts, half = [], 0.5 * track.rounding
+    for element, cant in product(_constant_sections(plan), _constant_sections(cants)):
         begin = max(element.begin, cant.begin) + half
         end = min(element.end - half, cant.end - half, last)
         if begin < end:
             radius = 1.0 / element.start_value if element.start_value else math.inf
-            found.append((max(begin, 0.0), end, radius, cant.start_value))
-    return sorted(found)
+            parts.append((max(begin, 0.0), end, radius, cant.start_value))
+    return sorted(parts)
 
 
-def _joined(sections: Sequence[Section]) -> list[Section]:
+def _constant_sections(sections: Sequence[Section]) -> list[Section]:
     """Sections of constant value; neighbours of equal value are joined."""
     constant: list[Section] = []
     for section in sections:
@@ -228,18 +228,18 @@ def _outside(zone: Zone, radius: float, deficiency: float, speed: float, service
     low, high = ends = [1e3 * share * unit for share in zone.cant_deficiency]  # mm
     reasons = []
     if not low - 1e3 * ROUNDING <= 1e3 * deficiency <= high + 1e3 * ROUNDING:
-        words = f"{beside_ends(1e3 * deficiency, ends)} mm, required {low:.4g} to {high:.4g} mm"
-        reasons.append(f"cant deficiency {words}")
+        text = f"{beside_ends(1e3 * deficiency, ends)} mm, required {low:.4g} to {high:.4g} mm"
+        reasons.append(f"cant deficiency {text}")
     if zone.speed is not None:
         slow, fast = ends = [share * service.admissible_speed for share in zone.speed]
         if not slow - ROUNDING <= speed <= fast + ROUNDING:
-            words = f"{beside_ends(speed, ends, 1)} m/s, required {slow:.4g} to {fast:.4g} m/s"
-            reasons.append(f"speed {words}")
+            text = f"{beside_ends(speed, ends, 1)} m/s, required {slow:.4g} to {fast:.4g} m/s"
+            reasons.append(f"speed {text}")
     return "; ".join(reasons)
 
 
 def reasons(sections: Sequence[TestSection]) -> list[str]:
     """Sentences on sections outside the conditions of their zones, grouped by reason."""
-    counted = Counter(section.reason for section in sections if section.reason)
+    counts = Counter(section.reason for section in sections if section.reason)
     words = "outside the conditions"
-    return [f"{n} section{'s' * (n > 1)} {words}: {why}" for why, n in counted.items()]
+    return [f"{n} section{'s' * (n > 1)} {words}: {reason}" for reason, n in counts.items()]

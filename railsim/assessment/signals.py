@@ -60,7 +60,7 @@ def between(s: Floats, begin: float, end: float) -> slice:
     return slice(int(np.searchsorted(s, begin)), int(np.searchsorted(s, end, side="right")))
 
 
-def passed(x: Floats, rate: float, band: Band, *, causal: bool = False) -> Floats:
+def in_band(x: Floats, rate: float, band: Band, *, causal: bool = False) -> Floats:
     """Values over time through the filter of a band."""
     low, high = band
     return band_passed(x, rate, low or 0.0, high, causal=causal)
@@ -82,13 +82,13 @@ class Signals:
         self._rows = record.rows_between(begin, end, WIDEST)
         # not caches of methods: these hold their object, and its arrays stay until the next search
         # for garbage
-        self._known: dict[Hashable, Any] = {}
+        self._cache: dict[Hashable, Any] = {}
 
-    def _once(self, key: Hashable, found: Callable[[], T]) -> T:
-        if key not in self._known:
-            self._known[key] = found()
-        known: T = self._known[key]
-        return known
+    def _once(self, key: Hashable, compute: Callable[[], T]) -> T:
+        if key not in self._cache:
+            self._cache[key] = compute()
+        value: T = self._cache[key]
+        return value
 
     def signal(
         self, form: "Callable[[Signals, Band | None], Signal | None]", band: Band | None
@@ -104,7 +104,7 @@ class Signals:
 
     def filtered(self, name: str, band: Band | None) -> Floats:
         """Quantity over the rows of the part with the margin of the filter, filtered once."""
-        return self._once((name, band), lambda: self.passed(self.near(self.raw(name), band), band))
+        return self._once((name, band), lambda: self.in_band(self.near(self.raw(name), band), band))
 
     def near(self, x: Floats, band: Band | None) -> Floats:
         """Of values over the rows of the widest margin those of the part with that of a filter."""
@@ -113,11 +113,11 @@ class Signals:
         rows = self.record.rows_between(self._begin, self._end, margin)
         return x[rows.start - self._rows.start : rows.stop - self._rows.start]
 
-    def passed(self, x: Floats, band: Band | None) -> Floats:
+    def in_band(self, x: Floats, band: Band | None) -> Floats:
         """Values over time through a filter, if there is one."""
         if band is None:
             return x
-        flat = passed(x.reshape(len(x), -1), self.record.rate, band, causal=self.causal)
+        flat = in_band(x.reshape(len(x), -1), self.record.rate, band, causal=self.causal)
         return flat.reshape(x.shape)
 
     def s_wheelset(self, band: Band | None) -> Floats:
@@ -134,7 +134,7 @@ def _labels(signals: Signals) -> list[str]:
     return [f"wheelset {w + 1}" for w in range(len(signals.record.offsets))]
 
 
-def _of_wheels(signals: Signals, values: Floats, band: Band | None) -> Signal:
+def _wheel_signal(signals: Signals, values: Floats, band: Band | None) -> Signal:
     """Signal of [time, wheelset, side]."""
     places = [(label, side) for label in _labels(signals) for side in (0, 1)]
     s = np.repeat(signals.s_wheelset(band), 2, axis=1)
@@ -149,12 +149,12 @@ def track_shifting_force(signals: Signals, band: Band | None) -> Signal:
 
 def wheel_load(signals: Signals, band: Band | None) -> Signal:
     """Q [N]."""
-    return _of_wheels(signals, signals.filtered("Q", band), band)
+    return _wheel_signal(signals, signals.filtered("Q", band), band)
 
 
 def guiding_force(signals: Signals, band: Band | None) -> Signal:
     """Y of each wheel, outwards positive [N]."""
-    return _of_wheels(signals, OUTWARDS * signals.filtered("Y", band), band)
+    return _wheel_signal(signals, OUTWARDS * signals.filtered("Y", band), band)
 
 
 def quotient(signals: Signals, band: Band | None) -> Signal:
@@ -162,20 +162,20 @@ def quotient(signals: Signals, band: Band | None) -> Signal:
     Q = signals.filtered("Q", band)
     with np.errstate(divide="ignore", invalid="ignore"):
         values = np.where(Q > 0.0, OUTWARDS * signals.filtered("Y", band) / Q, np.nan)
-    return _of_wheels(signals, values, band)
+    return _wheel_signal(signals, values, band)
 
 
 def rail_loading(signals: Signals, band: Band | None) -> Signal:
     """B = |Y| + 0.83 |Q| [N]."""
     values = np.abs(signals.filtered("Y", band)) + 0.83 * np.abs(signals.filtered("Q", band))
-    return _of_wheels(signals, values, band)
+    return _wheel_signal(signals, values, band)
 
 
 def wear_number(signals: Signals, band: Band | None) -> Signal | None:
     """T_gamma, where the result has it [N]."""
     if "T_gamma" not in signals.record.result:
         return None
-    return _of_wheels(signals, signals.filtered("T_gamma", band), band)
+    return _wheel_signal(signals, signals.filtered("T_gamma", band), band)
 
 
 def load_transfer(signals: Signals, band: Band | None) -> Signal:
@@ -194,7 +194,7 @@ def _acceleration(signals: Signals, band: Band | None, axis: int, *, frames: boo
         return None
     raw = signals.near(signals.raw("acceleration"), band)[:, columns, axis]
     s = np.stack([signals.s_sensor(names[k], band) for k in columns], axis=-1)
-    return Signal(signals.passed(raw, band), s, [(names[k], None) for k in columns])
+    return Signal(signals.in_band(raw, band), s, [(names[k], None) for k in columns])
 
 
 body_lateral = partial(_acceleration, axis=1, frames=False)

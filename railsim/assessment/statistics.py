@@ -120,13 +120,13 @@ def multiple_regression(x: Floats, y: Floats, target: Floats) -> Regression | No
     design = np.column_stack([np.ones(n), x / scale])
     if n <= k + 1 or np.linalg.matrix_rank(design, tol=1e-6 * np.sqrt(n)) <= k:
         return None
-    solved = np.linalg.lstsq(design, y, rcond=None)[0]
-    rest = float(np.sum((y - design @ solved) ** 2))
-    all_of_it = float(np.sum((y - np.mean(y)) ** 2))
+    coefficients = np.linalg.lstsq(design, y, rcond=None)[0]
+    residual = float(np.sum((y - design @ coefficients) ** 2))
+    total = float(np.sum((y - np.mean(y)) ** 2))
     return Regression(
-        n, (float(solved[0]), *(float(c) for c in solved[1:] / scale)),
-        math.sqrt(rest / (n - k - 1)), 1.0 - rest / all_of_it if all_of_it else 1.0,
-        float(solved[0] + np.sum(solved[1:] * target / scale)),
+        n, (float(coefficients[0]), *(float(c) for c in coefficients[1:] / scale)),
+        math.sqrt(residual / (n - k - 1)), 1.0 - residual / total if total else 1.0,
+        float(coefficients[0] + np.sum(coefficients[1:] * target / scale)),
     )  # fmt: skip
 
 

@@ -48,11 +48,11 @@ def zone_table(zone: ZoneReport) -> Table:
 def transition_table(assessment: Assessment) -> Table:
     """Of each quantity the largest value on all transitions, and where it is."""
     largest: dict[str, tuple[float, str, str, TestSection]] = {}
-    for run, own in assessment.transitions.items():
-        for one in own:
-            for (name, place), values in one.values.items():
-                found = max(values), place, run, one.section
-                largest[name] = max(largest.get(name, found), found, key=lambda row: row[0])
+    for run, x in assessment.transitions.items():
+        for v in x:
+            for (name, place), values in v.values.items():
+                entry = max(values), place, run, v.section
+                largest[name] = max(largest.get(name, entry), entry, key=lambda row: row[0])
     number = sum(map(len, assessment.transitions.values()))
     head = f"{number} transition{'s' * (number > 1)}, in no statistics"
     rows = []
@@ -66,16 +66,16 @@ def transition_table(assessment: Assessment) -> Table:
 
 
 def _row(row: Assessed) -> list[object]:
-    about, estimate = row.criterion, row.estimate
+    c, estimate = row.criterion, row.estimate
     limited = row.limit == row.limit
-    column = Column(about.name, unit=about.unit, format=".3f" if about.scale == 1.0 else ".2f")
+    column = Column(c.name, unit=c.unit, format=".3f" if c.scale == 1.0 else ".2f")
     limit = row.limit if limited else None
     value: object = Amount(estimate.value, column, limit=limit)
     if row.uncorrected is not None:
-        before = about.text(row.uncorrected.value)
-        value = f"{about.text(estimate.value, row.limit)} (uncorrected {before})"
+        before = c.text(row.uncorrected.value)
+        value = f"{c.text(estimate.value, row.limit)} (uncorrected {before})"
     return [
-        about.words, row.place, about.unit, estimate.N, Amount(estimate.mean, column),
+        c.words, row.place, c.unit, estimate.N, Amount(estimate.mean, column),
         Amount(estimate.deviation, column), SHORT[estimate.method], value,
         Amount(limit, column), Amount(100.0 * row.share, _SHARE, limit=100.0) if limited else None,
     ]  # fmt: skip
@@ -168,15 +168,15 @@ def _csv_rows(assessment: Assessment) -> Iterator[dict[str, Any]]:
 
 
 def _flat(row: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
     for name, value in row.items():
         if isinstance(value, list):
             value = dict(enumerate(value))
         if isinstance(value, dict):
-            found |= {f"{name}_{key}": member for key, member in value.items()}
+            flat |= {f"{name}_{key}": member for key, member in value.items()}
         else:
-            found[name] = value
-    return found
+            flat[name] = value
+    return flat
 
 
 def assessment_lines(assessment: Assessment, *, quiet: bool) -> list[str | Table]:
@@ -193,16 +193,16 @@ def assessment_lines(assessment: Assessment, *, quiet: bool) -> list[str | Table
         lines += [f"    {reason}" for reason in assessment.reasons]
     for table in tables(assessment):
         lines += ["", table]
-    left_out = [one for one in assessment.remarks if one.startswith(LEFT_OUT)]
-    remarks = left_out if quiet else [*left_out, *counted_remarks(_of_runs(assessment))]
+    left_out = [remark for remark in assessment.remarks if remark.startswith(LEFT_OUT)]
+    remarks = left_out if quiet else [*left_out, *counted_remarks(_remarks_by_run(assessment))]
     between = [""] * (not quiet or bool(left_out))
-    return [*lines, *between, *(f"remark: {one}" for one in remarks)]
+    return [*lines, *between, *(f"remark: {remark}" for remark in remarks)]
 
 
-def _of_runs(assessment: Assessment) -> Iterator[tuple[str, str]]:
+def _remarks_by_run(assessment: Assessment) -> Iterator[tuple[str, str]]:
     """Yield remarks with the names of their runs, nothing where they are of all."""
     for remark in assessment.remarks:
         if remark.startswith(LEFT_OUT):
             continue
-        name, _, words = remark.partition(": ")
-        yield (name, words) if name in assessment.runs else ("", remark)
+        name, _, text = remark.partition(": ")
+        yield (name, text) if name in assessment.runs else ("", remark)

@@ -45,16 +45,16 @@ class TrackQuality:
         rails = np.zeros((len(s), 4))
         if (function := displacement(track)) is not None:
             parts = np.array_split(s, math.ceil(len(s) / AT_ONCE))
-            at = [np.asarray(function(part)[0]).reshape(4, -1).T for part in parts]
-            rails = np.concatenate(at)
+            values = [np.asarray(function(part)[0]).reshape(4, -1).T for part in parts]
+            rails = np.concatenate(values)
         self._bands = {}
         for (short, long), margin in zip(bands, margins, strict=True):
             # the same places whatever the other bands are
-            own = np.arange(begin - margin, end + margin, SPACING)
+            places = np.arange(begin - margin, end + margin, SPACING)
             cut = round((max(margins) - margin) / SPACING)
             response = butterworth(1.0 / long, 1.0 / short)
-            found = filtered(rails[cut:][: len(own)], 1.0 / SPACING, response, margin)
-            self._bands[short, long] = own[: len(found)], found
+            band_values = filtered(rails[cut:][: len(places)], 1.0 / SPACING, response, margin)
+            self._bands[short, long] = places[: len(band_values)], band_values
 
     def deviations(
         self, begin: float, end: float, band: tuple[float, float] = D1
@@ -80,7 +80,7 @@ class TrackQuality:
         }  # fmt: skip
 
 
-def _at_speed(table: Sequence[tuple[Any, ...]], speed: float) -> tuple[Any, ...]:
+def _row_at_speed(table: Sequence[tuple[Any, ...]], speed: float) -> tuple[Any, ...]:
     """Row of `QN` or `DEFECTS` for a speed [m/s]."""
     return next((row for row in table if 3.6 * speed <= row[0] + 1e-3), table[-1])
 
@@ -91,9 +91,9 @@ def defect_class(speed: float, alignment: float, level: float) -> str:
     >>> defect_class(40.0, 7e-3, 9e-3), defect_class(40.0, 10.5e-3, 9e-3)
     ('between QN1 and QN2', 'worse than QN3')
     """
-    _, first, second = _at_speed(DEFECTS, speed)
-    limits = (first, first), second, tuple(1.3 * value for value in second)
-    over = [1e3 * alignment > of_y or 1e3 * level > of_z for of_y, of_z in limits]
+    _, qn1, qn2 = _row_at_speed(DEFECTS, speed)
+    limits = (qn1, qn1), qn2, tuple(1.3 * value for value in qn2)
+    over = [1e3 * alignment > limit_y or 1e3 * level > limit_z for limit_y, limit_z in limits]
     names = "better than QN1", "between QN1 and QN2", "between QN2 and QN3", "worse than QN3"
     return names[sum(over)]
 
@@ -107,6 +107,6 @@ def quality_class(speed: float, alignment: float, level: float) -> str:
     >>> quality_class(40.0, 0.71e-3, 0.98e-3), quality_class(40.0, 1.21e-3, 1.61e-3)
     ('better than QN1', 'between QN1 and QN2')
     """
-    row = _at_speed(QN, speed)
+    row = _row_at_speed(QN, speed)
     over = [(1e3 * alignment > row[1][k]) or (1e3 * level > row[2][k]) for k in (0, 1)]
     return ("better than QN1", "between QN1 and QN2", "worse than QN2")[sum(over)]

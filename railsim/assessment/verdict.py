@@ -53,12 +53,12 @@ def all_verdicts(
 ) -> dict[str, Verdict]:
     """Return the verdicts by criterion, on all runs, also those that did not reach their end."""
     derailed = [status_words(n, r) for n, r in runs.items() if r.status == "derailed"]
-    others = {n: r for n, r in runs.items() if r.status not in ("complete", "derailed")}
-    stopped = [f"{status_words(n, r)}: not assessed" for n, r in others.items()]
+    unfinished = {n: r for n, r in runs.items() if r.status not in ("complete", "derailed")}
+    stopped = [f"{status_words(n, r)}: not assessed" for n, r in unfinished.items()]
     missing = sentences([condition for condition in conditions if condition.state != MET])
-    found = {}
+    verdicts = {}
     for name in VERDICTS:
-        exceeded = [why for report in reports for why in _exceeded(report, name)]
+        exceeded = [reason for report in reports for reason in _exceedances(report, name)]
         rows = [(r.title, row) for r in reports for row in r.rows if row.criterion.group == name]
         few: dict[str, dict[str, None]] = {}  # quantities by zone, whatever the wheels
         for title, row in rows:
@@ -78,19 +78,19 @@ def all_verdicts(
             value = NOT_ASSESSED
         else:
             value = INCOMPLETE if incomplete or derailed else PASS
-        found[name] = Verdict(value, tuple(dict.fromkeys([*derailed, *exceeded, *incomplete])))
-    return found
+        verdicts[name] = Verdict(value, tuple(dict.fromkeys([*derailed, *exceeded, *incomplete])))
+    return verdicts
 
 
 def status_words(name: str, result: Result) -> str:
     """Say how a run ended, and why."""
-    why = str(result.attributes.get("status_reason", ""))
-    return f"{name}: {result.status}" + (f", {why}" if why else "")
+    reason = str(result.attributes.get("status_reason", ""))
+    return f"{name}: {result.status}" + (f", {reason}" if reason else "")
 
 
-def _exceeded(report: ZoneReport, criterion: str) -> list[str]:
+def _exceedances(report: ZoneReport, criterion: str) -> list[str]:
     """Return limits exceeded and wheels lifted, a sentence each."""
-    found = [
+    lines = [
         f"{report.title}: {row.criterion.words}, {row.place}: {beside(100.0 * row.share, 100.0)} % "
         "of the limit"
         for row in report.exceeded
@@ -98,5 +98,5 @@ def _exceeded(report: ZoneReport, criterion: str) -> list[str]:
     ]
     if criterion == SAFETY:
         lifted = [f"{wheel} without load over {m:.1f} m" for wheel, m in report.lifted.items()]
-        found += [f"{report.title}: {words}: Y/Q has no value" for words in lifted]
-    return found
+        lines += [f"{report.title}: {text}: Y/Q has no value" for text in lifted]
+    return lines

@@ -197,7 +197,7 @@ class WholeLifeRailModel:
         growth, removal = np.maximum(np.minimum(rising, falling), 0.0), np.minimum(falling, 0.0)
         return np.asarray(self.damage * growth + self.damage * removal)
 
-    def of_patches(self, T_gamma: Floats, along: Floats) -> Floats:
+    def patch_damage(self, T_gamma: Floats, along: Floats) -> Floats:
         """Damage by patches whose forces on the rail along travel have the sign of `along` [1]."""
         sign = {"against": -1.0, "along": 1.0}.get(self.counted)
         counts = True if sign is None else sign * along > 0.0

@@ -69,12 +69,12 @@ def rail_depth(
     Returns float64[position]: [m]; its integral over the grid is the worn area of a passage.
     """
     areas, ways, _, widths, wheel = _patches(result, wheelset, side, law)
-    _need(result, OF_RAILS, "settings.outputs.track=true")
-    at, track = (slice(None), wheelset, side), result.track()
+    _require(result, OF_RAILS, "settings.outputs.track=true")
+    wheel_index, track = (slice(None), wheelset, side), result.track()
     body = result.bodies.index(result.wheelsets[wheelset])
-    across = result["patch_y"][at] + result["body_position"][:, body, 1, None]
-    for moved in OF_RAILS:
-        across = across - result[moved][at][:, None]
+    across = result["patch_y"][wheel_index] + result["body_position"][:, body, 1, None]
+    for name in OF_RAILS:
+        across = across - result[name][wheel_index][:, None]
     rail = result.profiles[track.rail[side]]
     head = upper_side(rail)
     y = inclined_to_track(rail, track.gauge, track.inclination)[0][head]
@@ -87,12 +87,12 @@ def _patches(
     result: Result, wheelset: int, side: int, law: WearLaw
 ) -> tuple[Floats, Floats, Floats, Floats, Wheelset]:
     """Worn areas, distances, positions across in the wheelset's axes, half widths; wheelset."""
-    _need(result, NEEDED, "settings.outputs.contact_patches=true")
+    _require(result, NEEDED, "settings.outputs.contact_patches=true")
     wheel = flatten(result.vehicle()).of_kind("wheelset")[wheelset].wheelset
     if wheel is None:  # a body of this kind has its definition
         raise input_error("result", f"no wheelset {wheelset}", "", "wheelset")
-    own = (result[f"patch_{name}"][:, wheelset, side] for name in OF_PATCHES)
-    T_gamma, N, friction, a, b, y, z, angle = own
+    columns = (result[f"patch_{name}"][:, wheelset, side] for name in OF_PATCHES)
+    T_gamma, N, friction, a, b, y, z, angle = columns
     ways = np.gradient(result["distance"])
     speed = (ways / np.gradient(result["time"]))[:, None]
     patches = Patches(T_gamma, np.pi * a * b, 2.0 * wheel.radius[side], N, friction, speed)
@@ -102,7 +102,7 @@ def _patches(
     return law.worn_area(patches), ways, across, b * np.abs(np.cos(angle)), wheel
 
 
-def _need(result: Result, names: Sequence[str], output: str) -> None:
+def _require(result: Result, names: Sequence[str], output: str) -> None:
     """Refuse a result that lacks quantities."""
     words = "is not in it", f"run it with {output}"
     Faults(Fault("result", name, *words) for name in names if name not in result).check()
@@ -124,8 +124,8 @@ def spread(centres: Floats, widths: Floats, areas: Floats) -> Floats:
 
     The integral over each cell is exact.
     """
-    counted = areas > 0.0
-    y, b, A = centres[counted], np.maximum(widths[counted], 1e-5), areas[counted]
+    positive = areas > 0.0
+    y, b, A = centres[positive], np.maximum(widths[positive], 1e-5), areas[positive]
     edges = np.concatenate([grid() - 0.5 * SPACING, [RANGE[1]]])
     # first edge within each ellipse, and first one behind it
     first, end = np.searchsorted(edges, y - b), np.searchsorted(edges, y + b)
@@ -134,11 +134,11 @@ def spread(centres: Floats, widths: Floats, areas: Floats) -> Floats:
     for start in range(0, len(y), 20000):  # in parts, to limit the memory
         part = np.arange(start, min(start + 20000, len(y)))
         count = (end - first)[part]
-        of = np.repeat(part, count)
-        at = np.arange(len(of)) + np.repeat(end[part] - np.cumsum(count), count)
-        u = np.clip((edges[at] - y[of]) / b[of], -1.0, 1.0)
+        ellipse = np.repeat(part, count)
+        edge = np.arange(len(ellipse)) + np.repeat(end[part] - np.cumsum(count), count)
+        u = np.clip((edges[edge] - y[ellipse]) / b[ellipse], -1.0, 1.0)
         share = 0.5 + (u * np.sqrt(1.0 - u**2) + np.arcsin(u)) / np.pi
-        within += np.bincount(at, weights=share * A[of], minlength=len(edges))
+        within += np.bincount(edge, weights=share * A[ellipse], minlength=len(edges))
     return np.asarray((whole + np.diff(within)) / SPACING)
 
 
@@ -207,17 +207,17 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     smooth = scattered(profile, worn)
     side, lost = upper_side(profile), np.zeros(len(profile.y))
     lost[side] = np.interp(profile.y[side], grid(), smooth, left=0.0, right=0.0)
-    area, kept = SPACING * float(np.sum(worn)), float(np.trapezoid(lost, profile.y))
+    area, resolved = SPACING * float(np.sum(worn)), float(np.trapezoid(lost, profile.y))
     if area > 0.0:
-        if abs(kept / area - 1.0) > ROUNDING:
-            found = f"its points resolve {100.0 * kept / area:.0f} % of the worn area"
+        if abs(resolved / area - 1.0) > ROUNDING:
+            found = f"its points resolve {100.0 * resolved / area:.0f} % of the worn area"
             raise input_error(profile.name, found, "points at most 1 mm apart", "points")
-        lost *= area / kept
-    words = f"worn by {1e6 * area:.2f} mm2"
+        lost *= area / resolved
+    note = f"worn by {1e6 * area:.2f} mm2"
     name = f"{profile.name.removesuffix(WORN)}{WORN}"
     # z points down: a wheel loses height, a rail gains depth
     z = profile.z + lost if profile.kind == "rail" else profile.z - lost
-    origin = f"{profile.source}; {words}", profile.inclination, (*profile.notes, words)
+    origin = f"{profile.source}; {note}", profile.inclination, (*profile.notes, note)
     return Profile(name, profile.kind, profile.y, z, *origin)
 
 

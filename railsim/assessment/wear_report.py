@@ -42,8 +42,8 @@ class WheelWear:
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""
-        apart = "worn_area", "model"
-        plain = {name: value for name, value in self.__dict__.items() if name not in apart}
+        nested = "worn_area", "model"
+        plain = {name: value for name, value in self.__dict__.items() if name not in nested}
         return plain | self.worn_area
 
 
@@ -65,8 +65,8 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
     # largest index of each wheel, with the coordinates of its patch in the shakedown map
     worst, length = np.full((3, *shape), -np.inf), 0.0
     needed = (*PATCHES, "patch_T_gamma")
-    of_file = any(one.constants for one in laws.values())
-    if of_file:
+    from_file = any(entry.constants for entry in laws.values())
+    if from_file:
         record.need((*needed, "patch_friction"), "settings.outputs.contact_patches=true")
     patches = all(name in record.result for name in needed)
     worn = {n: np.zeros(shape) for n in laws if patches or laws[n] is wear.LAWS[wear.DEFAULT_LAW]}
@@ -87,14 +87,14 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
             each, along = (record.result.part(f"patch_{name}", rows) for name in ("T_gamma", "T_x"))
             area, fatigue = _patches(record, rows)
             load = record.result.part("patch_N", rows)
-            mu = record.result.part("patch_friction", rows) if of_file else mu
+            mu = record.result.part("patch_friction", rows) if from_file else mu
             worst = np.where(fatigue[0] > worst[0], fatigue, worst)
-        passes = model.of_patches(each, along) * ways[..., None]
+        passes = model.patch_damage(each, along) * ways[..., None]
         damage = damage + np.sum(passes, axis=0)
         speed = (way / np.gradient(record.time))[rows, None, None, None]
-        of_patches = wear.Patches(each, area, 2.0 * radii[..., None], load, mu, speed)
+        contacts = wear.Patches(each, area, 2.0 * radii[..., None], load, mu, speed)
         for name in worn:
-            lost = laws[name].worn_area(of_patches)
+            lost = laws[name].worn_area(contacts)
             worn[name] += np.sum(lost.sum(axis=-1) * ways, axis=0)
     if not length > 0.0:
         found = f"{record.time[-1] - record.time[0]:.3g} s"
@@ -124,8 +124,8 @@ def _patches(record: Record, rows: slice) -> tuple[Floats, Floats]:
     # k/p0 is T/N less the index
     pressure = 1.0 / np.where(loaded & (ratio > index), ratio - index, np.inf)
     index = np.where(loaded, index, -np.inf)
-    all_of = np.stack([index, ratio, pressure]).transpose(0, 2, 3, 1, 4)
-    all_of = all_of.reshape(*all_of.shape[:3], -1)
-    at = np.argmax(all_of[0], axis=-1)[None, ..., None]
-    worst = np.take_along_axis(all_of, at, axis=-1)[..., 0]
+    stacked = np.stack([index, ratio, pressure]).transpose(0, 2, 3, 1, 4)
+    stacked = stacked.reshape(*stacked.shape[:3], -1)
+    largest = np.argmax(stacked[0], axis=-1)[None, ..., None]
+    worst = np.take_along_axis(stacked, largest, axis=-1)[..., 0]
     return np.where(loaded, np.pi * a * b, 0.0), worst

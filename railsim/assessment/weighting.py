@@ -44,13 +44,13 @@ class Weighting:
         """Complex response at the frequencies `f` >= 0 [Hz]."""
         s = np.asarray(2j * np.pi * np.asarray(f), dtype=np.complex128)
         w1, w2, w3, w4 = (2.0 * np.pi * x for x in (self.f1, self.f2, self.f3, self.f4))
-        found: Complexes
-        found = s**2 / (s**2 + s * w1 / Q1 + w1**2) * w2**2 / (s**2 + s * w2 / Q1 + w2**2)
-        found = found * (w4**2 / w3) * (s + w3) / (s**2 + s * w4 / self.Q2 + w4**2)
+        H: Complexes
+        H = s**2 / (s**2 + s * w1 / Q1 + w1**2) * w2**2 / (s**2 + s * w2 / Q1 + w2**2)
+        H = H * (w4**2 / w3) * (s + w3) / (s**2 + s * w4 / self.Q2 + w4**2)
         w5, w6 = 2.0 * np.pi * self.f5, 2.0 * np.pi * self.f6
         above = s**2 / w5**2 + s / (self.Q3 * w5) + 1.0
         below = s**2 / w6**2 + s / (self.Q4 * w6) + 1.0
-        return found * self.K * above / below
+        return H * self.K * above / below
 
     def gain(self, f: Floats) -> Floats:
         """Magnitude of the response.

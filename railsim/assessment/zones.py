@@ -123,12 +123,12 @@ class ZoneReport:
     @property
     def nearest(self) -> list[Assessed]:
         """Of each quantity the row that is nearest to its limit, or has the extreme value."""
-        found: dict[str, Assessed] = {}
+        rows: dict[str, Assessed] = {}
         for row in (*self.rows, *self.information):
-            before = found.get(row.criterion.name)
+            before = rows.get(row.criterion.name)
             if before is None or row.rank > before.rank:
-                found[row.criterion.name] = row
-        return list(found.values())
+                rows[row.criterion.name] = row
+        return list(rows.values())
 
     @property
     def exceeded(self) -> tuple[Assessed, ...]:
@@ -155,11 +155,11 @@ class ZoneReport:
     @property
     def lifted(self) -> dict[str, float]:
         """Length without load by wheel [m]."""
-        found: dict[str, float] = defaultdict(float)
+        lengths: dict[str, float] = defaultdict(float)
         for value in self.values:
             for wheel, metres in value.lifted.items():
-                found[wheel] += metres
-        return dict(found)
+                lengths[wheel] += metres
+        return dict(lengths)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -196,19 +196,19 @@ def zone_reports(
     runs. `method` ({'normal', 'simplified'}).
     """
     groups = (SAFETY, INFORMATION) if population.fault else tuple(WORDS)
-    judged = [c for c in CRITERIA.values() if method in c.methods and c.group in groups]
+    criteria = [c for c in CRITERIA.values() if method in c.methods and c.group in groups]
     reports = []
     for zone in sorted(limits.zones):
-        all_own = tuple(s for s in sections if s.zone == zone)
-        if not all_own:
+        zone_sections = tuple(s for s in sections if s.zone == zone)
+        if not zone_sections:
             continue
-        own = tuple(v for v in values if v.section.zone == zone)
-        pooled = _Pooled(population, zone, own, limits, service)
-        rows = [row for criterion in judged for row in pooled.rows(criterion)]
+        counted = tuple(v for v in values if v.section.zone == zone)
+        pooled = _Pooled(population, zone, counted, limits, service)
+        rows = [row for criterion in criteria for row in pooled.rows(criterion)]
         limited = tuple(row for row in rows if row.criterion.group != INFORMATION)
-        beside = tuple(row for row in rows if row.criterion.group == INFORMATION)
+        rest = tuple(row for row in rows if row.criterion.group == INFORMATION)
         needed = limits.zones[zone].sections
-        reports.append(ZoneReport(zone, population, own, all_own, limited, beside, needed))
+        reports.append(ZoneReport(zone, population, counted, zone_sections, limited, rest, needed))
     return reports
 
 
@@ -237,18 +237,18 @@ class _Pooled:
             for (name, place), numbers in value.values.items():
                 if name == criterion.name:
                     pairs[place].append((value.section.cant_deficiency, numbers))
-        for place, own in pairs.items():
-            row = self._judged(criterion, place, own, WELL_SPREAD)
-            others = [self._judged(criterion, place, own, border) for border in BESIDE]
-            differing = [one.estimate for one in others if one.exceeded != row.exceeded]
+        for place, samples in pairs.items():
+            row = self._assess(criterion, place, samples, WELL_SPREAD)
+            others = [self._assess(criterion, place, samples, border) for border in BESIDE]
+            differing = [other.estimate for other in others if other.exceeded != row.exceeded]
             yield replace(row, other=next(iter(differing), None))
 
-    def _judged(self, criterion: Criterion, place: str, pairs: Pairs, border: float) -> Assessed:
+    def _assess(self, criterion: Criterion, place: str, pairs: Pairs, border: float) -> Assessed:
         """Estimate and limit, two-dimensional where cant deficiencies span `border` or more."""
         influence = np.array([deficiency for deficiency, _ in pairs])
         # the two signs of a section are not independent: each sign is a sample of its own
         signs = np.array([numbers for _, numbers in pairs]).T
-        estimate = _larger([self._estimate(criterion, influence, x, border) for x in signs])
+        estimate = _largest([self._estimate(criterion, influence, x, border) for x in signs])
         law = self.limits.limits.get(criterion.name)
         if law is None:
             return Assessed(criterion, place, estimate)
@@ -256,7 +256,7 @@ class _Pooled:
         row = Assessed(criterion, place, estimate, limit, law.source, law.checked)
         corrected = None
         if criterion.name == "Y_qst" and row.exceeded:
-            corrected = self._less_high_friction(place, signs[0])
+            corrected = self._friction_corrected(place, signs[0])
         if corrected is None:
             return row
         after = self._estimate(criterion, influence, corrected, border)
@@ -267,8 +267,8 @@ class _Pooled:
         number = re.match(r"(?:wheelset |frame_)(\d+)", place)
         wheelset = int(number[1]) - 1 if number else None
         static = math.nan if wheelset is None else float(np.mean(self.population.Q0[wheelset]))
-        at = self.service, self.zone, _mean_radius(self.values), wheelset, static
-        return Situation(self.population.vehicle, *at, self.limits.limits)
+        conditions = self.service, self.zone, _mean_radius(self.values), wheelset, static
+        return Situation(self.population.vehicle, *conditions, self.limits.limits)
 
     def _estimate(
         self, criterion: Criterion, influence: Floats, values: Floats, border: float
@@ -282,20 +282,20 @@ class _Pooled:
             return two_dimensional(influence, values, most, getattr(statistics.probability, kind))
         return one_dimensional(values, getattr(statistics.k, kind))
 
-    def _less_high_friction(self, place: str, guiding: Floats) -> Floats | None:
+    def _friction_corrected(self, place: str, guiding: Floats) -> Floats | None:
         """Guiding forces corrected where Y/Q of the inner wheel indicates high friction, if any.
 
         A section whose inner wheel carries nothing has no Y/Q and is not corrected.
         """
         law, inner = self.limits.high_friction, ("Y_over_Q_inner", place.replace("outer", "inner"))
-        own = [v.values for v in self.values if ("Y_qst", place) in v.values]
-        quotient = np.array([values.get(inner, [0.0])[0] for values in own])
+        rows = [v.values for v in self.values if ("Y_qst", place) in v.values]
+        quotient = np.array([values.get(inner, [0.0])[0] for values in rows])
         if law is None or not (quotient > law.threshold).any():
             return None
         return np.asarray(guiding - law.slope * np.maximum(quotient - law.threshold, 0.0))
 
 
-def _larger(estimates: Sequence[Estimate]) -> Estimate:
+def _largest(estimates: Sequence[Estimate]) -> Estimate:
     """The largest estimate, which decides; where none has a value that of the largest mean."""
-    known = [one for one in estimates if not math.isnan(one.value)]
-    return max(known or estimates, key=lambda one: one.value if known else one.mean)
+    finite = [e for e in estimates if not math.isnan(e.value)]
+    return max(finite or estimates, key=lambda e: e.value if finite else e.mean)

@@ -77,8 +77,8 @@ def _results(
     paths = [Path(files[0]) / f"{Path(name).stem}.h5" for name in names]
     if all(path.is_file() for path in paths):
         return [open_run(path) for path in paths]
-    from railsim.assessment.model_validation import matching
+    from railsim.assessment.model_validation import matched_results
     from railsim.studies.gathered import gather
 
     gathered = gather(files)
-    return matching(runs, gathered.results(list(gathered.paths)))
+    return matched_results(runs, gathered.results(list(gathered.paths)))

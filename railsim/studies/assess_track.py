@@ -21,7 +21,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from railsim.arrays import Floats, Integers
 from railsim.assessment.criteria import RIDE_BAND
-from railsim.assessment.signals import passed
+from railsim.assessment.signals import in_band
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.measured_file import embed_measured
@@ -410,7 +410,7 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
     placed = sensors(case.vehicle)
     for point, axis in product(POINTS, "yz"):
         x = result.series("sensor_acceleration", sensor=point, axis=axis)
-        x = passed(x, rate, RIDE_BAND)  # what is steady in curves has a limit of its own
+        x = in_band(x, rate, RIDE_BAND)  # what is steady in curves has a limit of its own
         name, s = f"body_{axis}", result["distance"] + placed[point].along
         signals.append((name, point, s, np.abs(x), limit(name)))
     return signals

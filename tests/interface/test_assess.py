@@ -14,7 +14,7 @@ from made_record import FINE, Q0, curve, made, track
 import railsim
 from railsim.assessment import Assessment, assess, running
 from railsim.assessment.comfort import MeanComfort, event_comfort
-from railsim.assessment.comfort_report import PointComfort, underestimated
+from railsim.assessment.comfort_report import PointComfort, shock_remark
 from railsim.assessment.safety import flange_angle
 from railsim.assessment.tables import assessment_lines, tables
 from railsim.assessment.wear import wear_law
@@ -596,8 +596,8 @@ def test_comfort_of_known_vibration():
     # of a sine MTVV is a_w, and VDV 1.11 a_w T^(1/4); shocks of round-off are none
     assert not any("underestimate" in remark for remark in found.remarks)
     quiet = replace(middle, MTVV=np.full(3, 9e-3), iso_rms=np.full(3, 1e-3))
-    assert not underestimated([quiet])
-    assert underestimated([replace(quiet, MTVV=np.full(3, 1.1e-2))])
+    assert not shock_remark([quiet])
+    assert shock_remark([replace(quiet, MTVV=np.full(3, 1.1e-2))])
 
 
 def test_shock_in_two_parts_of_a_run_is_in_the_values_of_iso_2631():

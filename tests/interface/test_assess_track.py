@@ -12,7 +12,7 @@ from selection import points
 
 import railsim
 from railsim.assessment.criteria import RIDE_BAND
-from railsim.assessment.signals import passed
+from railsim.assessment.signals import in_band
 from railsim.cli import main
 from railsim.plot.study import heat_strip
 from railsim.plot.style import LIMIT
@@ -145,7 +145,9 @@ def test_runs_go_on_behind_their_pieces_until_the_band_pass_has_forgotten_their_
         cut = int((20.0 + after) * module.RATE)
         for phase in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False):
             tone = 1.3 + np.sin(np.pi * time + phase)
-            whole, part = (passed(x, module.RATE, RIDE_BAND)[1000:2000] for x in (tone, tone[:cut]))
+            whole, part = (
+                in_band(x, module.RATE, RIDE_BAND)[1000:2000] for x in (tone, tone[:cut])
+            )
             assert part == pytest.approx(whole, abs=0.025)
     for case in found[2:]:
         assert case.until == pytest.approx(case.track.length)

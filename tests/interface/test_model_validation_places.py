@@ -7,7 +7,7 @@ from made_record import Q0, curve, made, track
 from test_section_values import FORCE, OUT, RIDE, Expected, Tones
 
 import railsim
-from railsim.assessment.model_validation import _alike
+from railsim.assessment.model_validation import _same_track
 from railsim.assessment.sections import TestSection
 from railsim.definitions.measurement import MeasurementFile
 from railsim.measurement import Measurement
@@ -155,9 +155,9 @@ def test_accelerations_of_axleboxes_and_frames_are_not_those_of_the_floor():
 )  # fmt: skip
 def test_tracks_are_alike_in_course_gauge_and_irregularities(change, same):
     one = track({"type": "STR", "length": 700.0})
-    assert _alike(one, one.replace(**change)) is same
-    assert _alike(one.replace(**change), one) is same
-    assert _alike(one.replace(**change), one.replace(**change))
+    assert _same_track(one, one.replace(**change)) is same
+    assert _same_track(one.replace(**change), one) is same
+    assert _same_track(one.replace(**change), one.replace(**change))
 
 
 OTHER = np.array([0.27, 1.13, 2.6, 4.1, 7.3, 11.9, 19.1])  # Hz: not alike, so that no place moves

@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from railsim.assessment.comfort_report import class_of
-from railsim.assessment.conditions import _conicity
+from railsim.assessment.conditions import _conicity_conditions
 from railsim.assessment.criteria import CRITERIA
 from railsim.assessment.model_comparison import QUANTITIES, Comparison, Pair
 from railsim.assessment.tables import zone_table
@@ -364,7 +364,7 @@ def compared(mean_limit, limit, least=2):
 
 
 def conicity(*values):
-    return [c.state for c in _conicity(np.array(values), RUNNING.conicity, SERVICE)]
+    return [c.state for c in _conicity_conditions(np.array(values), RUNNING.conicity, SERVICE)]
 
 
 def archard_k(speed=0.1, pressure=4.0):

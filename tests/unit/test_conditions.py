@@ -13,8 +13,8 @@ from railsim.assessment.conditions import (
     MET,
     NOT_MET,
     SectionRow,
-    _independent,
-    _quality,
+    _independent_count,
+    _quality_condition,
     missing_zones,
     vehicle_conditions,
     zone_conditions,
@@ -82,7 +82,7 @@ def test_independent_sections_are_the_most_that_share_no_irregularities(given):
     sizes = range(len(rows), 0, -1)
     most = next(n for n in sizes for chosen in combinations(rows, n)
                 if all(apart(*pair) for pair in combinations(chosen, 2)))  # fmt: skip
-    assert _independent(rows) == most
+    assert _independent_count(rows) == most
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_curves_tighter_than_all_zones_are_told_with_the_nearest_one():
 def test_nine_sections_of_ten_have_the_quality_that_is_stated():
     """0.1 to 1.1 mm in steps of 0.1 mm: one of eleven is above 1.0 mm."""
     rows = [row(k, alignment=1e-4 * (k + 1), level=2e-4 * (k + 1)) for k in range(11)]
-    found = _quality("zone 4", rows, None, SERVICE).found
+    found = _quality_condition("zone 4", rows, None, SERVICE).found
     assert found.startswith("90 % of the sections below 1.00 mm alignment and 2.00 mm level; 0 %")
 
 

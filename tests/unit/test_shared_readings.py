@@ -37,9 +37,9 @@ def test_roll_that_is_read_adds_up_to_the_way_the_car_body_leans(run: railsim.Re
 def test_readings_of_another_speed_are_read_again() -> None:
     rows = slice(0, 400)
     known = _Readings(0, np.full(400, 20.0), *(np.zeros((400, 2)) for _ in range(2)))
-    assert known.part_of(rows, np.full(400, 20.0)) is not None
-    assert known.part_of(rows, np.full(400, 21.0)) is None
-    assert known.part_of(slice(900, 950), np.full(50, 20.0)) is None
+    assert known.overlap(rows, np.full(400, 20.0)) is not None
+    assert known.overlap(rows, np.full(400, 21.0)) is None
+    assert known.overlap(slice(900, 950), np.full(50, 20.0)) is None
 
 
 def test_what_overlaps_is_not_read_again(
@@ -47,13 +47,13 @@ def test_what_overlaps_is_not_read_again(
 ) -> None:
     record = Record(run, "run", coarse=True)
     read: list[int] = []
-    own = Record._of_motion
+    own = Record._readings_of_motion
 
     def counted(self: Record, rows: slice, speed: np.ndarray) -> object:
         read.append(rows.stop - rows.start)
         return own(self, rows, speed)
 
-    monkeypatch.setattr(Record, "_of_motion", counted)
+    monkeypatch.setattr(Record, "_readings_of_motion", counted)
     record.readings(slice(0, 500))
     record.readings(slice(300, 800))
     assert read == [500, 1, 301]

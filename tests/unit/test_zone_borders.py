@@ -7,7 +7,7 @@ import pytest
 
 from railsim.assessment.sections import section_length, track_sections, zone_of
 from railsim.assessment.statistics import one_dimensional
-from railsim.assessment.zones import _larger
+from railsim.assessment.zones import _largest
 from railsim.cant import curve_speed
 from railsim.definitions.loading import load_running_limits
 from railsim.definitions.track.definition import Track
@@ -104,4 +104,4 @@ def test_of_the_two_signs_of_one_section_the_larger_is_shown_whatever_the_hand()
     """One value has no estimate: left and right exchanged, its mean is the same."""
     signs = [one_dimensional(np.array([x]), 3.0) for x in (1.1, 1.7)]
     assert all(np.isnan(one.value) for one in signs)
-    assert _larger(signs).mean == _larger(signs[::-1]).mean == 1.7
+    assert _largest(signs).mean == _largest(signs[::-1]).mean == 1.7

@@ -25,7 +25,7 @@ from railsim.assessment.comfort import (
     p_de,
     transition_comfort,
 )
-from railsim.assessment.comfort_report import MARGIN, PointComfort, _Gathered, short_of_blocks
+from railsim.assessment.comfort_report import MARGIN, PointComfort, _PointSums, block_remark
 from railsim.assessment.criteria import CRITERIA, Measured, steering_index
 from railsim.assessment.en14363 import FREQUENCIES, hunting_frequency, spectrum
 from railsim.assessment.record import Record
@@ -276,7 +276,7 @@ def test_values_of_left_hand_curves_are_those_of_their_mirror_images():
         if not isinstance(one.measure, Measured):
             continue
         sign = -1.0 if name in (*turned, "overturning") else 1.0
-        left, right = one.measure.evaluated(sign * x, -1), one.measure.evaluated(x, 1)
+        left, right = one.measure.evaluate(sign * x, -1), one.measure.evaluate(x, 1)
         assert left == pytest.approx(right, rel=1e-9), name
         assert name not in turned or np.all(np.isfinite(left))
 
@@ -335,7 +335,7 @@ def test_first_block_of_mean_comfort_is_free_of_the_start_of_the_record(f):
     whole = 0.5 + np.sin(2.0 * np.pi * f * t[:, None] + phases)
     record = SimpleNamespace(time=t[t >= 0.0], rate=rate, rows=len(t[t >= 0.0]) - 1)
     ((rows, counted),) = Record.pieces(record, MARGIN)
-    gathered = [_Gathered(0.0) for _ in phases]
+    gathered = [_PointSums(0.0) for _ in phases]
     for into, a in zip(gathered, whole[t >= 0.0][rows].T, strict=True):
         into.add(np.stack([a, a, a], axis=-1), counted, rate)
     first = np.array([into.blocks[0][0] for into in gathered])  # Wd along x, y, Wb along z
@@ -394,7 +394,7 @@ def test_mean_comfort_seated_and_standing_by_hand():
 
 
 def test_iso_2631_of_a_tone():
-    a, found = np.stack([0 * sine(5.0), 0 * sine(5.0), sine(5.0)], axis=-1), _Gathered(0.0)
+    a, found = np.stack([0 * sine(5.0), 0 * sine(5.0), sine(5.0)], axis=-1), _PointSums(0.0)
     found.add(a, slice(0, len(a)), RATE)
     rms = np.sqrt(found.iso / found.count)
     assert np.hypot.reduce(rms) == pytest.approx(1.0388 / np.sqrt(2.0), rel=2e-3)
@@ -497,7 +497,7 @@ def test_event_where_two_parts_of_a_record_meet():
     t = np.arange(0.0, 80.0, 1.0 / RATE)
     pulse = np.where(np.abs(t - 40.0) < 0.75, 2.0 * np.sin(2.0 * np.pi * (t - 40.0) / 1.5), 0.0)
     a = np.stack([0.0 * t, 1.0 + pulse, 0.0 * t], axis=-1)
-    gathered, half, margin = _Gathered(0.0), round(40.0 * RATE), round(16.0 * RATE)
+    gathered, half, margin = _PointSums(0.0), round(40.0 * RATE), round(16.0 * RATE)
     gathered.add(a[: half + margin], slice(0, half), RATE)
     gathered.add(a[half - margin :], slice(margin, margin + half), RATE)
     whole = event_comfort(a[:, 1], RATE)
@@ -511,7 +511,7 @@ def test_share_of_hunting_is_that_within_15_percent_of_its_frequency(f, tone):
     low, high = 0.85, 1.15
     turns = 2.0 * np.pi * tone * f * np.arange(0.0, 100.0, 1.0 / 200.0)
     a = np.stack([np.zeros_like(turns), np.sin(turns), np.cos(0.9 * turns)], axis=-1)
-    gathered = _Gathered(f)
+    gathered = _PointSums(f)
     gathered.add(a, slice(6000, 14000), 200.0)
     passed = 1.0 / (1.0 + ((tone**2 - low * high) / (tone * (high - low))) ** 8)
     assert gathered.hunting / gathered.iso[1] == pytest.approx(passed, abs=0.01)
@@ -762,6 +762,6 @@ def test_record_of_a_point_has_the_worst_transition_and_the_worst_block_of_each_
     assert found["iso2631_total"] == pytest.approx(0.7)
     assert (found["iso2631_MTVV"], found["iso2631_VDV"]) == ([0.3, 0.4, 0.9], [1.0, 2.0, 3.0])
     assert [found[name] for name in ("N_MV", "N_VA", "N_VD", "blocks")] == [1.0, 2.0, 3.0, 2]
-    assert short_of_blocks([point]) == "2 blocks of 5 s, EN 12299 requires 60"
+    assert block_remark([point]) == "2 blocks of 5 s, EN 12299 requires 60"
     whole = replace(point, mean=replace(mean, blocks=60))
-    assert short_of_blocks([whole]) == ""
+    assert block_remark([whole]) == ""

@@ -18,7 +18,7 @@ from railsim.assessment.model_comparison import (
     Overlay,
     Pair,
 )
-from railsim.assessment.model_validation import matching
+from railsim.assessment.model_validation import matched_results
 from railsim.cli import railsim as command_line
 from railsim.plot import validation as plots
 
@@ -310,11 +310,11 @@ def test_the_command_writes_its_files_and_fails_on_request(tmp_path, right):
 
 def test_a_study_gives_the_result_on_the_same_track_in_the_same_load(measured, right, tmp_path):
     other = simulated(railsim.load_vehicle("coach_25t", ["load=laden"]), 100.0)
-    assert matching([measured], {"laden": other, "right": right}) == [right]
+    assert matched_results([measured], {"laden": other, "right": right}) == [right]
     cases = (({"laden": other}, "0 results"), ({"a": right, "b": right}, "2 results: a, b"))
     for results, words in cases:
         with pytest.raises(railsim.InputError, match=words):
-            matching([measured], results)
+            matched_results([measured], results)
     for name, result in (("run_001", other), ("run_002", right)):
         result.to_hdf5(tmp_path / f"{name}.h5")
     arguments = ["validate-model", str(FOLDER / "coach_25t_run.toml"), str(tmp_path), "--json"]
