@@ -16,7 +16,7 @@ from railsim.assessment.record import Record
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.notation import SIDES
 from railsim.profiles import Profile
-from railsim.result.extremes import evaluated
+from railsim.result.extremes import evaluation_rows
 from railsim.track.irregularity import shown_displacement
 
 
@@ -139,7 +139,7 @@ def safety_report(record: Record) -> SafetyReport:
     As peaks, they leave out the run's start.
     """
     record.need_quantities("safety")
-    result, rows = record.result, evaluated(record.result)
+    result, rows = record.result, evaluation_rows(record.result)
     track, wheels = result.track(), []
     flat = flatten(result.vehicle())
     wheelsets = [w.wheelset for w in flat.of_kind("wheelset") if w.wheelset]

@@ -36,13 +36,13 @@ def write_attributes(place: Any, attributes: Values) -> None:
         h5a.create(place, name.encode(), kind, _SCALAR).write(array)
 
 
-def read_attribute(thing: Any, name: str) -> Any:
+def read_attribute(holder: Any, name: str) -> Any:
     """Return an attribute of a file, group or dataset of h5py, the same as that does."""
-    attribute = h5a.open(thing.id, name.encode())
+    attribute = h5a.open(holder.id, name.encode())
     dtype = attribute.dtype
     is_text = dtype.kind == "O" and h5py.check_string_dtype(dtype) is not None
     if attribute.shape != () or not (is_text or dtype.kind in "fiu"):
-        return thing.attrs[name]
+        return holder.attrs[name]
     array: Any = np.empty((), dtype=dtype)
     attribute.read(array)
     return array[()].decode("utf-8", "surrogateescape") if is_text else array[()]

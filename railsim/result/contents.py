@@ -60,8 +60,8 @@ class Contents:
     """
 
     def __init__(self, path: Path) -> None:
-        how = {"track_order": True, "rdcc_nbytes": 0, "locking": False}
-        self._file = h5py.File(path, "w", **how)
+        options = {"track_order": True, "rdcc_nbytes": 0, "locking": False}
+        self._file = h5py.File(path, "w", **options)
         self._datasets: dict[str, Dataset] = {}
         self._groups: set[str] = set()
 

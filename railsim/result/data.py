@@ -90,8 +90,8 @@ class Result:
         self._source = source
         self._arrays = arrays if isinstance(arrays, FrozenArrays) else FrozenArrays(arrays)
         self._quantities = MappingProxyType(dict(quantities))
-        named = {name: tuple(map(str, labels)) for name, labels in coordinates.items()}
-        self._coordinates = MappingProxyType(named)
+        labelled = {name: tuple(map(str, labels)) for name, labels in coordinates.items()}
+        self._coordinates = MappingProxyType(labelled)
         self._attributes = MappingProxyType(dict(attributes))
         self._profiles = MappingProxyType(dict(profiles))
         frozen_groups = {group: FrozenArrays(arrays) for group, arrays in groups.items()}
@@ -101,9 +101,9 @@ class Result:
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what `pickle` restores the result from: all arrays, read if necessary."""
         arrays = {name: np.asarray(array) for name, array in self._arrays.items()}
-        about = self._quantities, self._coordinates, self._attributes, self._profiles
+        facts = self._quantities, self._coordinates, self._attributes, self._profiles
         groups = {group: dict(arrays) for group, arrays in self._groups.items()}
-        return partial(Result, source=self._source), (arrays, *map(dict, about), groups)
+        return partial(Result, source=self._source), (arrays, *map(dict, facts), groups)
 
     # -- the arrays ---------------------------------------------------------------------------
 
@@ -119,8 +119,8 @@ class Result:
     def __getattr__(self, name: str) -> Floats:
         if not name.startswith("_") and (name in self._arrays or name in self._coordinates):
             return self[name]
-        known = (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")
-        raise AttributeError(f"a result has no '{name}'; {nearest(name, known)}")
+        names = (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")
+        raise AttributeError(f"a result has no '{name}'; {nearest(name, names)}")
 
     def __contains__(self, name: object) -> bool:
         return name in self._arrays
@@ -137,12 +137,12 @@ class Result:
         names = []
         for key in ("vehicle_toml", "track_toml"):
             text, keys = str(self._attributes.get(key, "")), ("name", "load")
-            found = [re.search(f"^{word} = (.*)$", text, re.MULTILINE) for word in keys]
-            if found[0]:
-                known = (printable(one[1].strip("\"'")) for one in found if one)
-                names.append(", load case ".join(known))
-        words = f" at {self.speed_words}" if "speed" in self._attributes else ""
-        return f"{' on '.join(names)}{words}".strip()
+            matches = [re.search(f"^{word} = (.*)$", text, re.MULTILINE) for word in keys]
+            if matches[0]:
+                parts = (printable(match[1].strip("\"'")) for match in matches if match)
+                names.append(", load case ".join(parts))
+        speed = f" at {self.speed_words}" if "speed" in self._attributes else ""
+        return f"{' on '.join(names)}{speed}".strip()
 
     @property
     def speed_words(self) -> str:
@@ -166,8 +166,8 @@ class Result:
         """Return what a notebook shows: the run, its wheel forces, and what the result holds."""
         facts = {"status": "", "status_reason": "", "speed": "m/s", "start": "m", "duration": "s",
                  "step": "s", "cpu_time": "s"}  # fmt: skip
-        known = ((name, self._attributes.get(name, ""), unit) for name, unit in facts.items())
-        rows = [[name, f"{x:.6g} {unit}" if unit else x] for name, x, unit in known if x != ""]
+        entries = ((name, self._attributes.get(name, ""), unit) for name, unit in facts.items())
+        rows = [[name, f"{x:.6g} {unit}" if unit else x] for name, x, unit in entries if x != ""]
         rows += [["remark", remark] for remark in self.remarks]
         held = [[q.name, q.long_name, q.unit, ", ".join(q.dims)] for q in self._quantities.values()]
         columns = ["name", "quantity", "unit", "dimensions"]
@@ -284,28 +284,28 @@ class Result:
         """Rebuild the vehicle's definition from the text that the result carries."""
         from railsim.definitions.loading import load_vehicle_text
 
-        return self._rebuilt("vehicle_toml", load_vehicle_text)
+        return self._definition("vehicle_toml", load_vehicle_text)
 
     def track(self) -> "Track":
         """Rebuild the track's definition from the text that the result carries."""
         from railsim.definitions.loading import load_track_text
 
-        return self._rebuilt("track_toml", load_track_text)
+        return self._definition("track_toml", load_track_text)
 
     def settings(self) -> "Settings":
         """Rebuild the settings from what the result carries."""
         from railsim.definitions.loading import load_settings_json
 
-        return self._rebuilt("settings_json", load_settings_json)
+        return self._definition("settings_json", load_settings_json)
 
-    def _rebuilt(self, name: str, load: Callable[[str], D]) -> D:
+    def _definition(self, name: str, load: Callable[[str], D]) -> D:
         """Return what an attribute describes; its faults name the file that holds it."""
         if name not in self._definitions:
             source = f"{self._source}: " if self._source else ""
             with changed_faults(lambda fault: replace(fault, file=f"{source}{fault.file}")):
                 self._definitions[name] = load(str(self._attributes[name]))
-        found: D = self._definitions[name]
-        return found
+        definition: D = self._definitions[name]
+        return definition
 
     def inputs(self) -> dict[str, Any]:
         """Return all that the run was made from: ``simulate(**result.inputs())`` runs it again."""
@@ -410,30 +410,30 @@ class Result:
             There is no such quantity or label.
         """
         pandas = optional_package("pandas", "to_pandas", "'railsim[pandas]'")
-        found = list(self.columns(*names))
-        columns = {column: values for column, _, values in found}
+        series = list(self.columns(*names))
+        columns = {column: values for column, _, values in series}
         frame = pandas.DataFrame(columns, index=pandas.Index(self["time"], name="time"))
-        frame.attrs["units"] = {column: unit for column, unit, _ in found}
+        frame.attrs["units"] = {column: unit for column, unit, _ in series}
         return frame
 
     def columns(self, *names: str) -> Iterator[tuple[str, str, Floats]]:
         """Yield name, unit and values of every column of quantities over time, see `to_pandas`."""
         over_time = [n for n, q in self._quantities.items() if q.dims[0] == "time" != n]
         for text in names or over_time:
-            name, *wanted = text.split(":")
+            name, *requested = text.split(":")
             array = self[name]
             if name not in over_time:
                 raise KeyError(f"{name} is not over time; {nearest(name, over_time)}")
             quantity = self._quantities[name]
             dims = quantity.dims[1:]
-            places = chosen_names(dims, self._coordinates, wanted)
+            places = chosen_names(dims, self._coordinates, requested)
             combinations = product(*(self._coordinates[dim] for dim in dims))
             columns = array.reshape(len(array), math.prod(array.shape[1:])).T  # also without rows
             for labels, values in zip(combinations, columns, strict=True):
                 if any(labels[k] not in chosen for k, chosen in places.items()):
                     continue
-                along = "component" in quantity.dims
-                unit = quantity.component(labels[-1]).unit if along else quantity.unit
+                by_component = "component" in quantity.dims
+                unit = quantity.component(labels[-1]).unit if by_component else quantity.unit
                 yield ":".join((name, *labels)), unit, values
 
 

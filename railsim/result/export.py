@@ -90,12 +90,12 @@ def selected(
     faults = Faults()
     for selection in quantities:
         name, *labels = selection.split(":")
-        there = name in result
-        dims = result.quantities[name].dims[1:] if there else ()
-        known = list(all_labels(dims, result.coordinates) if there else result)
-        for label in (label for label in (labels if there else [name]) if label not in known):
-            found = f"no label '{label}'" if there else "no such quantity"
-            allowed = nearest(label, known)
+        exists = name in result
+        dims = result.quantities[name].dims[1:] if exists else ()
+        choices = list(all_labels(dims, result.coordinates) if exists else result)
+        for label in (label for label in (labels if exists else [name]) if label not in choices):
+            found = f"no label '{label}'" if exists else "no such quantity"
+            allowed = nearest(label, choices)
             faults.append(argument_fault("quantities", selection, found, allowed, "QUANTITY"))
     time, distance = result["time"], result["distance"]
     if not len(time) and (between or rate is not None):
@@ -112,8 +112,8 @@ def selected(
         faults.require(0.0 < rate < np.inf, "rate", f"found {rate:.12g}", "above 0 per s")
     faults.check()
     names = [selection.partition(":")[0] for selection in quantities]
-    wanted = dict.fromkeys(["time", "distance", *(names or result)])
-    chosen = {name: quantity for name, quantity in result.quantities.items() if name in wanted}
+    requested = dict.fromkeys(["time", "distance", *(names or result)])
+    chosen = {name: quantity for name, quantity in result.quantities.items() if name in requested}
     instants = time[rows]
     if rate is not None and len(rows):
         if (number := rate * (instants[-1] - instants[0])) > MOST_INSTANTS:
@@ -125,10 +125,10 @@ def selected(
         array = result[name]
         if quantity.dims[:1] == ("time",):
             smooth = array if rate is None or name in POSITIONS else _smooth(result, name, rate)
-            array = array[rows] if rate is None else _at(instants, time, smooth)
+            array = array[rows] if rate is None else _interpolate(instants, time, smooth)
         arrays[name] = array * (quantity.scale if shown_units else 1.0)
     if shown_units:
-        chosen = {name: replace(one, unit=one.shown_unit) for name, one in chosen.items()}
+        chosen = {name: replace(q, unit=q.shown_unit) for name, q in chosen.items()}
     return Result(arrays, chosen, result.coordinates, result.attributes, result.profiles)
 
 
@@ -143,29 +143,29 @@ def _smooth(result: Result, name: str, rate: float) -> Floats:
     if len(time) < 4:
         return values
     steps = np.diff(time)
-    own = even_step(time)
-    step = own or float(max(steps.min(), 0.1 * steps.mean()))
+    steady_step = even_step(time)
+    step = steady_step or float(max(steps.min(), 0.1 * steps.mean()))
     if rate * step >= 1.0:
         return values
     even = np.arange(time[0], time[-1] + 0.5 * step, step)
 
-    def passed(x: Floats) -> Floats:
-        slow = low_passed(x if own else _at(even, time, x), 1.0 / step, 0.4 * rate)
-        return slow if own else _at(time, even, slow)
+    def low_pass(x: Floats) -> Floats:
+        slow = low_passed(x if steady_step else _interpolate(even, time, x), 1.0 / step, 0.4 * rate)
+        return slow if steady_step else _interpolate(time, even, slow)
 
     if name == "Y_over_Q" and {"Y", "Q"} <= set(result):
-        return outward_quotient(passed(result["Y"]), passed(result["Q"]))
+        return outward_quotient(low_pass(result["Y"]), low_pass(result["Q"]))
     columns = values.reshape(len(time), -1).copy()
     for column in columns.T:
-        known = np.isfinite(column)
-        if known.any() and not known.all():
-            column[:] = np.interp(time, time[known], column[known])
-    return np.where(np.isnan(values), np.nan, passed(columns).reshape(values.shape))
+        finite = np.isfinite(column)
+        if finite.any() and not finite.all():
+            column[:] = np.interp(time, time[finite], column[finite])
+    return np.where(np.isnan(values), np.nan, low_pass(columns).reshape(values.shape))
 
 
-def _at(instants: Floats, time: Floats, values: Floats) -> Floats:
-    found = np.array([np.interp(instants, time, one) for one in values.reshape(len(time), -1).T])
-    return found.T.reshape(len(instants), *values.shape[1:])
+def _interpolate(instants: Floats, time: Floats, values: Floats) -> Floats:
+    columns = np.array([np.interp(instants, time, x) for x in values.reshape(len(time), -1).T])
+    return columns.T.reshape(len(instants), *values.shape[1:])
 
 
 Columns = list[tuple[str, str, Floats]]
@@ -178,9 +178,9 @@ def _columns(result: Result, quantities: Sequence[str] = ()) -> Columns:
     return [("time", "s", result["time"]), *columns.values()]
 
 
-def _csv(found: Columns, path: Path) -> None:
-    table = np.stack([values for _, _, values in found], axis=1)
-    head = [name if unit == "1" else f"{name} ({unit})" for name, unit, _ in found]
+def _csv(columns: Columns, path: Path) -> None:
+    table = np.stack([values for _, _, values in columns], axis=1)
+    head = [name if unit == "1" else f"{name} ({unit})" for name, unit, _ in columns]
     with open(path, "w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerow(head)
         for begin in range(0, len(table), ROWS_AT_ONCE):
@@ -205,10 +205,10 @@ def _matlab(result: Result, path: Path) -> None:
         savemat(file, data, long_field_names=True, oned_as="column", do_compression=True)
 
 
-def _parquet(found: Columns, path: Path) -> None:
+def _parquet(columns: Columns, path: Path) -> None:
     pandas = optional_package("pandas", "Parquet", "pandas pyarrow")
     optional_package("pyarrow", "Parquet", "pandas pyarrow")  # what writes it
-    frame = pandas.DataFrame({name: values for name, _, values in found})
-    frame.attrs = {"units": {name: unit for name, unit, _ in found}}
+    frame = pandas.DataFrame({name: values for name, _, values in columns})
+    frame.attrs = {"units": {name: unit for name, unit, _ in columns}}
     with open(path, "wb") as file:
         frame.to_parquet(file)

@@ -77,23 +77,23 @@ def peak(result: Result, name: str, kind: str = "abs") -> Peak:
     Of the quantities in the group ``peaks`` over all steps of the run, of others over its outputs;
     from the attribute ``evaluation_start`` on, in files without it over the whole run.
     """
-    of_steps = result.groups.get("peaks", {})
-    if name in of_steps:
+    step_peaks = result.groups.get("peaks", {})
+    if name in step_peaks:
         rows = {"abs": slice(0, 2), "max": slice(0, 1), "min": slice(1, 2)}[kind]
-        values, times, distances = (of_steps[name + e][rows] for e in ("", "_time", "_distance"))
-        index = at = _extreme(values, kind)
+        values, times, distances = (step_peaks[name + e][rows] for e in ("", "_time", "_distance"))
+        index = row = _extreme(values, kind)
     else:
-        rows = evaluated(result)
+        rows = evaluation_rows(result)
         values = result.part(name, rows)
         times, distances = result["time"][rows], result["distance"][rows]
         index = _extreme(values, kind)
-        at = index[:1]
-    value, where = float(values[index]), _labels(result, name, index[1:])
-    place = float(times[at]), float(distances[at])
-    return Peak(result.quantities[name], value, where, *place, kind)
+        row = index[:1]
+    value, labels = float(values[index]), _labels(result, name, index[1:])
+    place = float(times[row]), float(distances[row])
+    return Peak(result.quantities[name], value, labels, *place, kind)
 
 
-def evaluated(result: Result) -> slice:
+def evaluation_rows(result: Result) -> slice:
     """Instants of a result that peaks are evaluated over; all where none is in that part."""
     begin = float(result.attributes.get("evaluation_start", -math.inf))
     first = int(np.searchsorted(result["time"], begin - 1e-9))
@@ -111,34 +111,34 @@ def _extreme(array: Floats, kind: str) -> tuple[Any, ...]:
     return int(np.argmax(np.where(np.isnan(over_time), -np.inf, over_time))), *wheel
 
 
-def _low_pass_of(result: Result, name: str, rate: float, known: dict[str, Floats]) -> Floats | None:
+def _smoothed(result: Result, name: str, rate: float, cache: dict[str, Floats]) -> Floats | None:
     """Return a quantity after a low pass of `LOW_PASS` without phase, over the evaluated part.
 
     Butterworth of order 4; without the `EDGE` of the record, whose last value is unfiltered.  Y/Q
     is the quotient of both after the low pass, so that a wheel that has lifted does not spoil the
     rest, where `LOADED` of the static load are left.  None where there are gaps.
 
-    `rate`: outputs per second; `known` keeps what has been filtered of this result, and is filled.
+    `rate`: outputs per second; `cache` keeps what has been filtered of this result, and is filled.
     """
 
-    def passed(part: str) -> Floats:
-        if part not in known:
-            known[part] = low_passed(result[part], rate, LOW_PASS)
-        return known[part]
+    def low_pass(part: str) -> Floats:
+        if part not in cache:
+            cache[part] = low_passed(result[part], rate, LOW_PASS)
+        return cache[part]
 
     if name == "Y_over_Q" and {"Y", "Q"} <= set(result):
-        loaded = passed("Q") > (LOADED * result["Q0"] if "Q0" in result else 0.0)
-        smooth = np.where(loaded, outward_quotient(passed("Y"), passed("Q")), np.nan)
+        loaded = low_pass("Q") > (LOADED * result["Q0"] if "Q0" in result else 0.0)
+        smooth = np.where(loaded, outward_quotient(low_pass("Y"), low_pass("Q")), np.nan)
     elif np.isnan(result[name]).any():
         return None
     elif name == "dQ_over_Q0" and {"Q", "Q0"} <= set(result):
-        smooth = passed("Q") / result["Q0"] - 1.0
+        smooth = low_pass("Q") / result["Q0"] - 1.0
     elif name == "sum_Y" and "Y" in result:
-        smooth = passed("Y")[..., 0] + passed("Y")[..., 1]
+        smooth = low_pass("Y")[..., 0] + low_pass("Y")[..., 1]
     else:
-        smooth = passed(name)
+        smooth = low_pass(name)
     edge = math.ceil(EDGE / LOW_PASS * rate)
-    return np.asarray(smooth[max(edge, evaluated(result).start) : -edge])
+    return np.asarray(smooth[max(edge, evaluation_rows(result).start) : -edge])
 
 
 def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...]:
@@ -149,19 +149,19 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
     """
     if not len(result["time"]):
         return ()
-    known: dict[str, Floats] = {}
-    found: list[Peak] = []
+    cache: dict[str, Floats] = {}
+    extremes: list[Peak] = []
     step = even_step(result["time"]) or math.inf
     often = step * LOW_PASS * LEAST_RATE <= 1.0
-    for name in _wanted(result, names):
+    for name in _quantity_names(result, names):
         filtered = often and name in FORCES
-        smooth = _low_pass_of(result, name, 1.0 / step, known) if filtered else None
+        smooth = _smoothed(result, name, 1.0 / step, cache) if filtered else None
         for kind in ("max", "min") if name in BY_SIGN else ("abs",):
-            one = peak(result, name, kind)
+            extreme = peak(result, name, kind)
             if smooth is not None and not np.isnan(smooth).all():
-                one = replace(one, smooth=float(smooth[_extreme(smooth, kind)]))
-            found.append(one)
-    return tuple(found)
+                extreme = replace(extreme, smooth=float(smooth[_extreme(smooth, kind)]))
+            extremes.append(extreme)
+    return tuple(extremes)
 
 
 @dataclass(frozen=True)
@@ -210,18 +210,18 @@ def mid_curves(
     if not given. `track`: That of the result; by default it is rebuilt from the text that the
     result carries.
     """
-    wanted, distance = _wanted(result, names), result["distance"]
+    chosen, distance = _quantity_names(result, names), result["distance"]
     if len(distance) < 2 or not distance[0] < distance[-1]:
         return ()
-    on = track or result.track()
+    track = track or result.track()
     return tuple(
-        _mid_curve(result, wanted, one, smooth=not on.irregularities)
-        for one in curvature_sections(on)
-        if one.type == "CIR" and distance[0] <= 0.5 * (one.begin + one.end) <= distance[-1]
+        _mid_curve(result, chosen, arc, smooth=not track.irregularities)
+        for arc in curvature_sections(track)
+        if arc.type == "CIR" and distance[0] <= 0.5 * (arc.begin + arc.end) <= distance[-1]
     )
 
 
-def _wanted(result: Result, names: Iterable[str] | None) -> list[str]:
+def _quantity_names(result: Result, names: Iterable[str] | None) -> list[str]:
     return [n for n in PEAK_QUANTITIES if n in result] if names is None else list(names)
 
 
@@ -243,12 +243,12 @@ def _mid_curve(result: Result, names: list[str], section: Section, *, smooth: bo
     after = max(1, int(np.searchsorted(distance, middle)))
     share = (middle - distance[after - 1]) / (distance[after] - distance[after - 1])
 
-    def there(name: str) -> Floats:
+    def at_middle(name: str) -> Floats:
         array = result[name]
         return np.asarray((1.0 - share) * array[after - 1] + share * array[after])
 
-    values = {name: there(name) for name in names}
-    time = float(there("time"))
+    values = {name: at_middle(name) for name in names}
+    time = float(at_middle("time"))
 
     def largest(name: str, array: Floats) -> Peak:
         index = _extreme(array[None], "abs")[1:]
@@ -258,10 +258,10 @@ def _mid_curve(result: Result, names: list[str], section: Section, *, smooth: bo
     begin, end = _full_curve(result, section)
     first, last = np.searchsorted(distance, begin), np.searchsorted(distance, end, "right")
     medians, scatter, changes = _over_curve(result, slice(int(first), int(last)), values)
-    peaks, steady = (tuple(starmap(largest, of.items())) for of in (values, medians))
-    found = values, peaks, medians, scatter, steady, (begin, end)
+    peaks, steady = (tuple(starmap(largest, arrays.items())) for arrays in (values, medians))
+    statistics = values, peaks, medians, scatter, steady, (begin, end)
     unsettled = bool(smooth and len(changes) and np.mean(changes) > 0.5)
-    return MidCurve(radius, middle, time, *found, unsettled)
+    return MidCurve(radius, middle, time, *statistics, unsettled)
 
 
 def _over_curve(
@@ -274,23 +274,23 @@ def _over_curve(
     parts = {name: result.part(name, rows) for name in values}
     if not parts or len(next(iter(parts.values()))) < 2:
         return dict(values), {name: np.zeros_like(x) for name, x in values.items()}, np.zeros(0)
-    over = np.concatenate([part.reshape(len(part), -1).T for part in parts.values()])
-    wanted = DEVIATION[0], 50.0, DEVIATION[1]
-    gaps = np.isnan(over).any(axis=1)
-    bounds = np.empty((3, len(over)))
-    bounds[:, ~gaps] = np.percentile(over[~gaps], wanted, axis=1)
+    stacked = np.concatenate([part.reshape(len(part), -1).T for part in parts.values()])
+    percents = DEVIATION[0], 50.0, DEVIATION[1]
+    gaps = np.isnan(stacked).any(axis=1)
+    bounds = np.empty((3, len(stacked)))
+    bounds[:, ~gaps] = np.percentile(stacked[~gaps], percents, axis=1)
     # Y/Q is undefined for an unloaded wheel; where there is none, it takes half of the time
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a wheel that never carries: NaN
-        bounds[:, gaps] = np.nanpercentile(over[gaps], wanted, axis=1)
+        bounds[:, gaps] = np.nanpercentile(stacked[gaps], percents, axis=1)
     deviation = 0.5 * (bounds[2] - bounds[0])
     ends = np.cumsum([array.size for array in values.values()])[:-1]
 
-    def by_name(found: Floats) -> dict[str, Floats]:
-        each = zip(values.items(), np.split(found, ends), strict=True)
-        return {name: part.reshape(array.shape) for (name, array), part in each}
+    def by_name(flat: Floats) -> dict[str, Floats]:
+        pairs = zip(values.items(), np.split(flat, ends), strict=True)
+        return {name: part.reshape(array.shape) for (name, array), part in pairs}
 
-    return by_name(bounds[1]), by_name(deviation), _settling(over, bounds[1])
+    return by_name(bounds[1]), by_name(deviation), _settling(stacked, bounds[1])
 
 
 def _settling(values: Floats, medians: Floats) -> Floats:

@@ -169,12 +169,12 @@ def integral(s: Floats, x: Floats) -> Floats:
     return np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(parts, axis=0)])
 
 
-def _integral_at(s: Floats, x: Floats, summed: Floats, at: Floats) -> Floats:
-    i = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(s) - 2)
+def _integral_at(s: Floats, x: Floats, cumulative: Floats, places: Floats) -> Floats:
+    i = np.clip(np.searchsorted(s, places, side="right") - 1, 0, len(s) - 2)
     shape = (-1, *(1 for _ in x.shape[1:]))
-    d = (at - s[i]).reshape(shape)
+    d = (places - s[i]).reshape(shape)
     slope = (x[i + 1] - x[i]) / (s[i + 1] - s[i]).reshape(shape)
-    return np.asarray(summed[i] + x[i] * d + 0.5 * slope * d**2)
+    return np.asarray(cumulative[i] + x[i] * d + 0.5 * slope * d**2)
 
 
 def distance_means(s: Floats, x: Floats, centres: Floats, length: float) -> Floats:
@@ -188,9 +188,9 @@ def distance_means(s: Floats, x: Floats, centres: Floats, length: float) -> Floa
     >>> distance_means(s, 2.0 * s, np.array([1.0, 2.5]), 2.0).tolist()
     [2.0, 5.0]
     """
-    summed = integral(s, x)
-    high = _integral_at(s, x, summed, centres + 0.5 * length)
-    return (high - _integral_at(s, x, summed, centres - 0.5 * length)) / length
+    cumulative = integral(s, x)
+    high = _integral_at(s, x, cumulative, centres + 0.5 * length)
+    return (high - _integral_at(s, x, cumulative, centres - 0.5 * length)) / length
 
 
 def window_centres(begin: float, end: float, length: float, step: float) -> Floats:
@@ -253,6 +253,6 @@ class StreamingPercentiles:
         if not self.count:
             return math.nan
         below = np.cumsum(self._counts)
-        wanted = per_cent / 100.0 * (self.count - 1) + 1.0
-        cell = int(np.searchsorted(below, wanted - 1e-9))
+        rank = per_cent / 100.0 * (self.count - 1) + 1.0
+        cell = int(np.searchsorted(below, rank - 1e-9))
         return (cell - len(self._counts) // 2 + 0.5) * self.width

@@ -40,7 +40,7 @@ from railsim.result.attributes import Values, check_attributes
 from railsim.result.contents import Contents, Dataset
 from railsim.result.data import Attributes, Result, frozen
 from railsim.result.integrity import seal
-from railsim.result.reading import opened
+from railsim.result.reading import open_checked
 
 # what is wrong with the disk rather than with the name
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EFBIG)
@@ -130,7 +130,7 @@ class Hdf5Sink(sinks.Sink):
             quantity, inner = self._quantities[name], self._blocks[name].shape[1:]
             rows = _chunk_rows(inner, length)
             self._datasets[name] = self._contents.create(
-                name, (0, *inner), np.dtype(self._storage.kind(name)), _about(quantity),
+                name, (0, *inner), np.dtype(self._storage.kind(name)), _attributes(quantity),
                 quantity.dims, chunks=(rows, *(max(1, size) for size in inner)), growing=True,
                 compress=self._storage.compress,
             )  # fmt: skip
@@ -167,10 +167,10 @@ class Hdf5Sink(sinks.Sink):
             self._write_rest(statics, profiles, groups)
             self._contents.finish(sinks.root_attributes(self._attributes, attributes))
             seal(self._partial.path)
-            wanted, self.path = self.path, self._partial.finish(overwrite=self._overwrite)
-        if self.path != wanted:
-            _LOG.warning(f"{wanted} has appeared in the meantime; the result is {self.path}")
-        return opened(self.path, just_sealed=True)
+            requested, self.path = self.path, self._partial.finish(overwrite=self._overwrite)
+        if self.path != requested:
+            _LOG.warning(f"{requested} has appeared in the meantime; the result is {self.path}")
+        return open_checked(self.path, just_sealed=True)
 
     def _write_rest(self, statics: Named, profiles: Named, groups: Named) -> None:
         if not self._datasets:
@@ -180,18 +180,18 @@ class Hdf5Sink(sinks.Sink):
         for name, quantity in self._quantities.items():
             if "time" not in quantity.dims:
                 array = frozen(statics[name])
-                self._contents.store(name, array, _about(quantity), quantity.dims)
+                self._contents.store(name, array, _attributes(quantity), quantity.dims)
         for name, profile in profiles.items():
             _write_profile(self._contents, name, profile)
         for group, arrays in groups.items():
             if group == PEAKS:  # of the quantities that are kept only
-                kept = self._quantities
-                arrays = {n: a for n, a in arrays.items() if sinks.peak_quantity(n) in kept}
+                stored = self._quantities
+                arrays = {n: a for n, a in arrays.items() if sinks.peak_quantity(n) in stored}
                 if arrays:
                     _write_names(self._contents, f"{PEAKS}/extreme", EXTREMES)
             for name, array in arrays.items():
-                about, dims = _about_peak(name) if group == PEAKS else ({}, ())
-                self._contents.store(f"{group}/{name}", frozen(array), about, dims)
+                attributes, dims = _peak_attributes(name) if group == PEAKS else ({}, ())
+                self._contents.store(f"{group}/{name}", frozen(array), attributes, dims)
 
     def abort(self) -> None:
         """Remove what was written so far; harmless after `close`."""
@@ -210,8 +210,8 @@ def _disk_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except (OSError, RuntimeError) as error:
-        said = re.search(r"errno = (\d+)", str(error))
-        number = getattr(error, "errno", None) or (int(said[1]) if said else 0)
+        match = re.search(r"errno = (\d+)", str(error))
+        number = getattr(error, "errno", None) or (int(match[1]) if match else 0)
         if not number and not isinstance(error, OSError):
             raise
         number = number or errno.EIO
@@ -232,8 +232,8 @@ def write(
         if name in QUANTITIES and quantity.unit != QUANTITIES[name].unit:  # as it would be read
             found, allowed = f"{name} in {quantity.unit}", "SI; `export` writes other units"
             raise InputError([Fault(str(path), name, found, allowed)])
-    wanted = set(result if names is None else names)
-    selected = {name: q for name, q in result.quantities.items() if name in wanted}
+    chosen = set(result if names is None else names)
+    selected = {name: q for name, q in result.quantities.items() if name in chosen}
     with Hdf5Sink(path, overwrite=overwrite, option=str(path), storage=storage) as sink:
         sink.begin(result.coordinates, selected.values())
         sink.append({name: result[name] for name in sinks.timed(selected)})
@@ -247,8 +247,8 @@ def _write_names(contents: Contents, dim: str, labels: Sequence[str]) -> None:
     # GNU Octave reads no fixed-length UTF-8, and what is ASCII is the same in both
     encoding = "ascii" if all(label.isascii() for label in labels) else "utf-8"
     kind = h5py.string_dtype(encoding, max((len(label) for label in encoded), default=1))
-    about = {"_Encoding": "utf-8", "long_name": f"name of the {dim.removeprefix(f'{PEAKS}/')}"}
-    contents.store(dim, np.array(encoded, dtype=kind), about, (dim,))
+    attributes = {"_Encoding": "utf-8", "long_name": f"name of the {dim.removeprefix(f'{PEAKS}/')}"}
+    contents.store(dim, np.array(encoded, dtype=kind), attributes, (dim,))
 
 
 def _chunk_rows(inner: Shape, length: int | None) -> int:
@@ -263,34 +263,34 @@ def _chunk_rows(inner: Shape, length: int | None) -> int:
     return rows
 
 
-def _about(quantity: Quantity) -> Values:
-    about: dict[str, str | float] = {"units": quantity.unit, "long_name": quantity.long_name}
+def _attributes(quantity: Quantity) -> Values:
+    attributes: dict[str, str | float] = {"units": quantity.unit, "long_name": quantity.long_name}
     if quantity.sign:
-        about["comment"] = quantity.sign
+        attributes["comment"] = quantity.sign
     if quantity.name not in QUANTITIES:
-        about["symbol"] = quantity.symbol
-        about["shown_units"] = quantity.shown_unit
-        about["shown_scale"] = quantity.scale
-    return about
+        attributes["symbol"] = quantity.symbol
+        attributes["shown_units"] = quantity.shown_unit
+        attributes["shown_scale"] = quantity.scale
+    return attributes
 
 
-def _about_peak(name: str) -> tuple[Values, Sequence[str]]:
+def _peak_attributes(name: str) -> tuple[Values, Sequence[str]]:
     """Units, names and dimensions of largest and smallest values, their times or distances."""
     base = sinks.peak_quantity(name)
     quantity = QUANTITIES[base]
-    words = f"largest and smallest {quantity.long_name}"
+    long_name = f"largest and smallest {quantity.long_name}"
     if name != base:
         other = QUANTITIES[name.removeprefix(f"{base}_")]
-        about = {"units": other.unit, "long_name": f"{words}: {other.long_name}"}
+        attributes = {"units": other.unit, "long_name": f"{long_name}: {other.long_name}"}
     else:
-        about = {"units": quantity.unit, "long_name": words}
-    return about, (f"{PEAKS}/extreme", *quantity.dims[1:])
+        attributes = {"units": quantity.unit, "long_name": long_name}
+    return attributes, (f"{PEAKS}/extreme", *quantity.dims[1:])
 
 
 def _write_profile(contents: Contents, name: str, profile: Profile) -> None:
-    words = f"{profile.kind} profile {profile.name}: y, z"
-    about: dict[str, str | float] = {"units": "m", "long_name": words}
-    about |= {fact: getattr(profile, fact) for fact in ("name", "kind", "source", "inclination")}
-    about["notes"] = "\n".join(profile.notes)
+    long_name = f"{profile.kind} profile {profile.name}: y, z"
+    facts: dict[str, str | float] = {"units": "m", "long_name": long_name}
+    facts |= {fact: getattr(profile, fact) for fact in ("name", "kind", "source", "inclination")}
+    facts["notes"] = "\n".join(profile.notes)
     points = np.column_stack([profile.y, profile.z])
-    contents.store(f"profiles/{quote(name, safe=' ')}", points, about)
+    contents.store(f"profiles/{quote(name, safe=' ')}", points, facts)

@@ -74,14 +74,14 @@ class Hunting:
         'The vehicle hunts at 4.8 Hz, 7.4 mm, wheelsets 1 to 4, from s = 300 m.'
         """
         first, *_, last = numbers = [w + 1 for w in (*self.wheelsets, *self.wheelsets[-1:])]
-        who = f"wheelsets {', '.join(map(str, numbers[:-2]))} and {last}"
+        wheelsets = f"wheelsets {', '.join(map(str, numbers[:-2]))} and {last}"
         if len(self.wheelsets) == 1:
-            who = f"wheelset {first}"
+            wheelsets = f"wheelset {first}"
         elif len(self.wheelsets) == last - first + 1 > 2:
-            who = f"wheelsets {first} to {last}"
+            wheelsets = f"wheelsets {first} to {last}"
         until = "" if self.lasts else f" to {self.end:.0f} m"
         return (
-            f"{HUNTS} at {self.frequency:.1f} Hz, {1e3 * self.amplitude:.1f} mm, {who}, "
+            f"{HUNTS} at {self.frequency:.1f} Hz, {1e3 * self.amplitude:.1f} mm, {wheelsets}, "
             f"from s = {self.begin:.0f} m{until}."
         )
 
@@ -107,39 +107,39 @@ def hunting(record: Result, rails: Rails | None = None) -> Hunting | None:
     rate = min(RATE, (len(time) - 1) / duration)
     grid = np.arange(time[0], time[-1], 1.0 / rate)
 
-    def seen(name: str) -> Floats:
+    def on_grid(name: str) -> Floats:
         columns = record[name].reshape(len(time), -1).T
         return np.stack([np.interp(grid, time, column) for column in columns], axis=-1)
 
     def band(values: Floats) -> Floats:
         return band_passed(values, rate, LOW, min(HIGH, 0.4 * rate))
 
-    lateral = band(seen("wheelset_lateral"))
+    lateral = band(on_grid("wheelset_lateral"))
     cycles_of = [_Cycles(swing) for swing in lateral.T]
     if not any(np.any(cycles.regular()) for cycles in cycles_of):  # most runs
         return None
-    force = band(seen("sum_Y"))
+    force = band(on_grid("sum_Y"))
     found: list[tuple[float, float, int, int]] = []  # amplitude, cycles per sample, begin, end
     for w, cycles in enumerate(cycles_of):
         swing = cycles.amplitudes(lateral[:, w])
         hunts = cycles.regular() & _regular(swing) & _regular(cycles.amplitudes(force[:, w]))
         hunts &= _lasting(swing)
         if rails is not None and np.any(hunts):
-            y_left, z_left, y_right, z_right = rails(seen("wheelset_distance")[:, w])[0]
+            y_left, z_left, y_right, z_right = rails(on_grid("wheelset_distance")[:, w])[0]
             for wave in (0.5 * (y_left + y_right), 0.5 * (z_right - z_left)):
                 hunts &= ~_same_waves(cycles.amplitudes(band(wave)), swing)
         windows = np.flatnonzero(hunts)
         if len(windows):
             most = windows[np.argmax(_mean(swing)[windows])]
             begin, end = cycles.starts[windows[0]], cycles.starts[windows[-1] + CYCLES]
-            of_most = float(_mean(swing)[most]), 1.0 / float(_mean(cycles.lengths)[most])
-            found.append((*of_most, int(begin), int(end)))
+            largest = float(_mean(swing)[most]), 1.0 / float(_mean(cycles.lengths)[most])
+            found.append((*largest, int(begin), int(end)))
     if not found:
         return None
     amplitude, frequency, *_ = max(found)
-    begin, end = min(each[2] for each in found), max(each[3] for each in found)
+    begin, end = min(cycle[2] for cycle in found), max(cycle[3] for cycle in found)
     swings = np.std(lateral[begin:end], axis=0)
-    way = seen("distance")[[begin, min(end, len(grid) - 1)], 0]
+    way = on_grid("distance")[[begin, min(end, len(grid) - 1)], 0]
     hunt = tuple(np.flatnonzero(swings >= TOO * np.max(swings)).tolist())
     lasts = end >= len(grid) - 2.0 / frequency
     return Hunting(frequency * rate, amplitude, hunt, float(way[0]), float(way[1]), lasts)

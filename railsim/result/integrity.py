@@ -38,12 +38,12 @@ _BLOCK = 2**20
 
 def seal(path: Path) -> None:
     """Write the seal behind the last byte of a file."""
-    crc, length = _crc_of(path, path.stat().st_size)
+    crc, length = _file_crc(path, path.stat().st_size)
     with open(path, "ab") as file:
         file.write(b"railsim-seal crc32 %08x of %020d bytes\n" % (crc, length))
 
 
-def sealed(path: Path) -> bool:
+def has_seal(path: Path) -> bool:
     """Whether a file has a seal; then it is as it was written.
 
     Raises InputError: what it holds is not what its seal says. Raises OSError: it cannot be read.
@@ -51,15 +51,15 @@ def sealed(path: Path) -> bool:
     size = path.stat().st_size
     with open(path, "rb") as file:
         file.seek(max(0, size - _SEAL_BYTES))
-        found = _SEAL.fullmatch(file.read())
-    if not found:
+        match = _SEAL.fullmatch(file.read())
+    if not match:
         return False
-    if (int(found[1], 16), int(found[2])) != _crc_of(path, size - _SEAL_BYTES):
+    if (int(match[1], 16), int(match[2])) != _file_crc(path, size - _SEAL_BYTES):
         raise input_error(path, "its bytes are not those of its seal", REMEDY)
     return True
 
 
-def _crc_of(path: Path, length: int) -> tuple[int, int]:
+def _file_crc(path: Path, length: int) -> tuple[int, int]:
     crc, done = 0, 0
     with open(path, "rb") as file:
         while done < length and (block := file.read(min(_BLOCK, length - done))):
@@ -80,11 +80,11 @@ class Facts:
 
 def digest(attributes: Mapping[str, Any], datasets: Mapping[str, Facts]) -> str:
     """Return the digest of the root attributes and all datasets of a file."""
-    found = hashlib.sha256(_text(attributes).encode())
-    for name, of in sorted(datasets.items()):
-        facts = json.dumps([name, of.kind, list(of.shape), f"{of.crc:08x}"])
-        found.update(f"{facts} {_text(of.attributes)}\n".encode())
-    return f"sha256:{found.hexdigest()}"
+    sha = hashlib.sha256(_text(attributes).encode())
+    for name, dataset in sorted(datasets.items()):
+        facts = json.dumps([name, dataset.kind, list(dataset.shape), f"{dataset.crc:08x}"])
+        sha.update(f"{facts} {_text(dataset.attributes)}\n".encode())
+    return f"sha256:{sha.hexdigest()}"
 
 
 def content_digest(file: h5py.File) -> str:
@@ -101,15 +101,15 @@ def _datasets(group: h5py.Group, above: str = "") -> Iterator[tuple[str, Facts]]
             yield from _datasets(member, f"{above}{name}/")
 
 
-def _attributes(thing: h5py.File | h5py.Dataset) -> dict[str, Any]:
-    names = [name for name in thing.attrs if not name.startswith(_INTERNAL)]
-    return {name: read_attribute(thing, name) for name in names}
+def _attributes(holder: h5py.File | h5py.Dataset) -> dict[str, Any]:
+    names = [name for name in holder.attrs if not name.startswith(_INTERNAL)]
+    return {name: read_attribute(holder, name) for name in names}
 
 
 def _text(attributes: Mapping[str, Any]) -> str:
     """Return attributes as text, the same before and after they were stored."""
-    own = {name: value for name, value in attributes.items() if not name.startswith(_INTERNAL)}
-    return json.dumps({name: _plain(value) for name, value in own.items()}, sort_keys=True)
+    public = {name: value for name, value in attributes.items() if not name.startswith(_INTERNAL)}
+    return json.dumps({name: _plain(value) for name, value in public.items()}, sort_keys=True)
 
 
 def _plain(value: Any) -> Any:

@@ -21,10 +21,10 @@ def known_labels(dim: str, names: Sequence[str]) -> dict[str, int]:
 def index_of(dim: str, names: Sequence[str], label: str | int) -> int:
     """Return the index of a label, a text or an integer from 0; KeyError: there is no such one."""
     if isinstance(label, str):
-        known = known_labels(dim, names)
-        if label not in known:
-            raise KeyError(f"no {dim} '{label}'; {nearest(label, known)}")
-        return known[label]
+        indices = known_labels(dim, names)
+        if label not in indices:
+            raise KeyError(f"no {dim} '{label}'; {nearest(label, indices)}")
+        return indices[label]
     if not -len(names) <= label < len(names):
         raise KeyError(f"no {dim} {label}; 0 to {len(names) - 1}, or a name")
     return int(label)
@@ -35,7 +35,7 @@ def all_labels(
 ) -> dict[str, tuple[str, str]]:
     """Return dimension and name of all texts that name a place along some dimensions."""
     each = ((dim, coordinates[dim], known_labels(dim, coordinates[dim])) for dim in dims)
-    return {label: (dim, names[k]) for dim, names, known in each for label, k in known.items()}
+    return {label: (dim, names[k]) for dim, names, index in each for label, k in index.items()}
 
 
 def chosen_names(
@@ -45,11 +45,11 @@ def chosen_names(
 
     Raises KeyError: a label that is not known.
     """
-    known = all_labels(dims, coordinates)
-    found: dict[int, list[str]] = {}
+    places = all_labels(dims, coordinates)
+    chosen: dict[int, list[str]] = {}
     for label in labels:
-        if label not in known:
-            raise KeyError(f"no label '{label}'; {nearest(label, known)}")
-        dim, name = known[label]
-        found.setdefault(dims.index(dim), []).append(name)
-    return found
+        if label not in places:
+            raise KeyError(f"no label '{label}'; {nearest(label, places)}")
+        dim, name = places[label]
+        chosen.setdefault(dims.index(dim), []).append(name)
+    return chosen

@@ -52,9 +52,9 @@ class LowPassSink(SinkBefore):
 
     def begin(self, coordinates: Coordinates, quantities: Iterable[Quantity] = ALWAYS) -> None:
         """See `Sink.begin`."""
-        wanted = tuple(quantities)
-        self._names = tuple(q.name for q in wanted if "time" in q.dims)
-        super().begin(coordinates, wanted)
+        chosen = tuple(quantities)
+        self._names = tuple(q.name for q in chosen if "time" in q.dims)
+        super().begin(coordinates, chosen)
 
     def append(self, chunk: Mapping[str, Floats]) -> None:
         """See `Sink.append`."""
@@ -67,26 +67,26 @@ class LowPassSink(SinkBefore):
         if not len(chunk["time"]):
             return
         self._last = float(chunk["time"][-1])
-        self._hand_on(self._filter.take(self._needed(chunk)))
+        self._hand_on(self._filter.take(self._needed_arrays(chunk)))
 
-    def _ended(self, attributes: Attributes) -> Attributes:
+    def _finish(self, attributes: Attributes) -> Attributes:
         self._hand_on(self._filter.end())
         return attributes
 
-    def _needed(self, chunk: Mapping[str, Floats]) -> dict[str, Floats]:
+    def _needed_arrays(self, chunk: Mapping[str, Floats]) -> dict[str, Floats]:
         names = set(self._names)
         if "Y_over_Q" in names:
             names = names - {"Y_over_Q"} | {"Y", "Q"}
-        found = {name: np.asarray(chunk[name]) for name in names}
+        arrays = {name: np.asarray(chunk[name]) for name in names}
         for name in names.intersection(WITH_GAPS):
-            values, known = found[name], ~np.isnan(found[name])
-            found[name + GAPS] = np.where(known, 0.0, 1.0)
+            values, valid = arrays[name], ~np.isnan(arrays[name])
+            arrays[name + GAPS] = np.where(valid, 0.0, 1.0)
             before = self._held.get(name, np.zeros(values.shape[1:]))
             rows = np.arange(1, len(values) + 1).reshape(-1, *(1 for _ in before.shape))
-            last = np.maximum.accumulate(np.where(known, rows, 0), axis=0)
-            found[name] = np.take_along_axis(np.concatenate([before[None], values]), last, axis=0)
-            self._held[name] = found[name][-1]
-        return found
+            last = np.maximum.accumulate(np.where(valid, rows, 0), axis=0)
+            arrays[name] = np.take_along_axis(np.concatenate([before[None], values]), last, axis=0)
+            self._held[name] = arrays[name][-1]
+        return arrays
 
     def _hand_on(self, filtered: dict[str, Floats]) -> None:
         if not filtered or not len(filtered["time"]):
@@ -94,8 +94,8 @@ class LowPassSink(SinkBefore):
         if "Y_over_Q" in self._names:
             filtered["Y_over_Q"] = outward_quotient(filtered["Y"], filtered["Q"])
         for name in [name for name in filtered if name.endswith(GAPS)]:
-            gaps, of = filtered.pop(name) > 0.0, name.removesuffix(GAPS)
-            filtered[of] = np.where(gaps, np.nan, filtered[of])
+            gaps, quantity = filtered.pop(name) > 0.0, name.removesuffix(GAPS)
+            filtered[quantity] = np.where(gaps, np.nan, filtered[quantity])
         self._sink.append(filtered)
 
 
@@ -154,28 +154,28 @@ class _Symmetric:
         if count <= 0:
             return {}
         span = slice(self._skip, self._skip + (count - 1) * self._every + len(self._taps))
-        found = {}
+        output = {}
         for name, array in self._window.items():
             part = array[span]
             if name in UNFILTERED or name.endswith(GAPS):
-                found[name] = part[self._half :: self._every][:count]
+                output[name] = part[self._half :: self._every][:count]
             else:
                 flat = self._filtered_rows(part.reshape(len(part), -1), count)
-                found[name] = flat.reshape(count, *part.shape[1:])
+                output[name] = flat.reshape(count, *part.shape[1:])
         used = self._skip + count * self._every
         drop = min(used, length)
         self._window = {name: array[drop:] for name, array in self._window.items()}
         self._skip = used - drop
-        return found
+        return output
 
     def _filtered_rows(self, flat: Floats, count: int) -> Floats:
         """Filter columns; in blocks of rows, as most of a large matrix would be zeros."""
-        found = np.empty((count, flat.shape[1]))
+        output = np.empty((count, flat.shape[1]))
         for first in range(0, count, BLOCK):
             matrix = _banded(self._taps.tobytes(), min(BLOCK, count - first), self._every)
             begin = first * self._every
-            found[first : first + BLOCK] = matrix @ flat[begin : begin + matrix.shape[1]]
-        return found
+            output[first : first + BLOCK] = matrix @ flat[begin : begin + matrix.shape[1]]
+        return output
 
 
 @cache
@@ -201,7 +201,7 @@ class _Causal:
         self._skip = 0
 
     def take(self, chunk: dict[str, Floats]) -> dict[str, Floats]:
-        found = {}
+        output = {}
         for name, array in chunk.items():
             passed = array
             if name not in UNFILTERED and not name.endswith(GAPS):
@@ -210,9 +210,9 @@ class _Causal:
                 passed, self._states[name] = self._signal.sosfilt(
                     self._sections, array, axis=0, zi=self._states[name]
                 )
-            found[name] = passed[self._skip :: self._every]
+            output[name] = passed[self._skip :: self._every]
         self._skip = (self._skip - len(chunk["time"])) % self._every
-        return found
+        return output
 
     def end(self) -> dict[str, Floats]:
         return {}

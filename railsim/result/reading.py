@@ -29,7 +29,7 @@ from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
 from railsim.result.attributes import read_attribute
 from railsim.result.data import FrozenArrays, Result, frozen
-from railsim.result.integrity import DIGEST, REMEDY, content_digest, sealed
+from railsim.result.integrity import DIGEST, REMEDY, content_digest, has_seal
 from railsim.result.sinks import FORMAT, peak_quantity
 from railsim.text import shortened
 
@@ -65,10 +65,10 @@ def open_result(path: str | Path) -> Result:
     `path`: File that `railsim run`, `railsim study` or `Result.to_hdf5` wrote. Raises InputError:
     there is no such file, it is not a result of railsim, or it is damaged.
     """
-    return opened(Path(path))
+    return open_checked(Path(path))
 
 
-def opened(path: Path, *, just_sealed: bool = False) -> Result:
+def open_checked(path: Path, *, just_sealed: bool = False) -> Result:
     """Open a result file as `open_result`; `just_sealed`: its seal need not be looked at again."""
     if not is_file(path):
         found = "not a regular file" if os.path.lexists(path) else "there is no such file"
@@ -78,7 +78,7 @@ def opened(path: Path, *, just_sealed: bool = False) -> Result:
         if path.stat().st_size == 0:
             raise input_error(path, "the file is empty", AS_WRITTEN)
         stamp = _stamp(os.stat(path))
-        whole = just_sealed or sealed(path)
+        whole = just_sealed or has_seal(path)
         with h5py.File(path, "r") as file:
             _refuse_another(path, file, stamp)
             return _Reader(file, path, stamp).result(whole=whole)
@@ -204,12 +204,12 @@ def _readable(path: Path, name: str = "") -> Iterator[None]:
     except InputError:
         raise
     except Exception as error:
-        words = " ".join(str(error).split())
+        reason = " ".join(str(error).split())
         if isinstance(error, OSError) and error.errno is not None and error.strerror:
-            words = os.strerror(error.errno)
-        words = shortened(words, 160)
-        is_hdf5 = isinstance(error, OSError) and "signature not found" in words
-        found = "not an HDF5 file" if is_hdf5 else f"cannot be read ({words})"
+            reason = os.strerror(error.errno)
+        reason = shortened(reason, 160)
+        is_hdf5 = isinstance(error, OSError) and "signature not found" in reason
+        found = "not an HDF5 file" if is_hdf5 else f"cannot be read ({reason})"
         allowed = "give a result file of railsim (.h5)"
         allowed += "" if is_hdf5 and path.suffix != ".h5" else f"; {REMEDY}"
         raise input_error(path, found, allowed, name) from None
@@ -231,7 +231,7 @@ class _Dataset(NamedTuple):
         self.place.read(h5s.ALL, h5s.ALL, array)
         return array
 
-    def of_h5py(self) -> h5py.Dataset:
+    def as_h5py(self) -> h5py.Dataset:
         return h5py.Dataset(self.place)
 
 
@@ -250,9 +250,9 @@ class _Reader:
     def result(self, *, whole: bool) -> Result:
         file = self._file
         facts = self._attributes(file, "")
-        known = facts.get("format")
-        if known not in (FORMAT, *OLDER):
-            raise self.fault("format", f"found {known or 'nothing'}", f"a result says '{FORMAT}'")
+        version = facts.get("format")
+        if version not in (FORMAT, *OLDER):
+            raise self.fault("format", f"found {version or 'nothing'}", f"a result says '{FORMAT}'")
         members = dict(self._members(file, ""))
         groups = {name: group for name, group in members.items() if isinstance(group, h5py.Group)}
         inner = {name: dict(self._members(group, f"{name}/")) for name, group in groups.items()}
@@ -270,11 +270,11 @@ class _Reader:
             raise self.fault(DIGEST, "what it holds is not what its digest says", REMEDY)
         facts.pop(DIGEST, None)
         self._check_facts(facts)
-        if known in OLDER:
-            remarks = [*str(facts.get("remarks", "")).splitlines(), OLDER[known]]
+        if version in OLDER:
+            remarks = [*str(facts.get("remarks", "")).splitlines(), OLDER[version]]
             facts["remarks"] = "\n".join(dict.fromkeys(remarks))
         datasets = {name: each for name, each in members.items() if name not in groups}
-        coordinates, quantities = self._described(datasets)
+        coordinates, quantities = self._inventory(datasets)
         stored_profiles = inner.pop("profiles", {}).items()
         profiles = {unquote(k): self._profile(f"profiles/{k}", one) for k, one in stored_profiles}
         arrays: dict[str, dict[str, Floats]] = {}
@@ -284,8 +284,8 @@ class _Reader:
         self._check_peaks(arrays.get("peaks", {}), quantities, coordinates)
         shapes = {name: datasets[name].shape for name in quantities}
         stored = StoredArrays(self._path, shapes, self._stamp)
-        about = quantities, coordinates, facts, profiles, arrays
-        return Result(stored, *about, source=str(self._path))
+        parts = quantities, coordinates, facts, profiles, arrays
+        return Result(stored, *parts, source=str(self._path))
 
     # -- before anything is read ------------------------------------------------------------------
 
@@ -318,21 +318,21 @@ class _Reader:
         if not shape:
             raise self.fault(name, "no array")
         declared = math.prod(shape) * dtype.itemsize
-        held = place.get_storage_size()
-        if declared > held and h5py.h5z.FILTER_DEFLATE not in filters:
-            raise self.fault(name, f"says {declared} bytes and holds {held}", REMEDY)
+        stored = place.get_storage_size()
+        if declared > stored and h5py.h5z.FILTER_DEFLATE not in filters:
+            raise self.fault(name, f"says {declared} bytes and holds {stored}", REMEDY)
         self._declared += declared
         return _Dataset(place, dtype, shape)
 
-    def _attributes(self, thing: Any, name: str) -> dict[str, Any]:
+    def _attributes(self, holder: Any, name: str) -> dict[str, Any]:
         """Return attributes as plain values; whole numbers come as numpy's."""
         facts: dict[str, Any] = {}
-        for key in thing.attrs:
+        for key in holder.attrs:
             if key in ("DIMENSION_LIST", "REFERENCE_LIST"):
                 continue
             location = f"{name}.{key}" if name else key
             with _readable(self._path, location):
-                value = read_attribute(thing, key)
+                value = read_attribute(holder, key)
             value = value.item() if isinstance(value, np.generic) else value
             if isinstance(value, bytes):  # a text of fixed length
                 value = value.decode("utf-8", errors="replace")
@@ -357,8 +357,8 @@ class _Reader:
     ) -> None:
         for name, array in arrays.items():
             base = peak_quantity(name)
-            beside = {f"{base}{ending}" for ending in ("", "_time", "_distance")}
-            if base not in QUANTITIES or base not in quantities or not beside <= arrays.keys():
+            triple = {f"{base}{ending}" for ending in ("", "_time", "_distance")}
+            if base not in QUANTITIES or base not in quantities or not triple <= arrays.keys():
                 raise self.fault(f"peaks/{name}", "no such quantity, or not all of it is there")
             inner = tuple(len(coordinates.get(dim, ())) for dim in QUANTITIES[base].dims[1:])
             if array.shape != (len(EXTREMES), *inner):
@@ -366,12 +366,12 @@ class _Reader:
 
     # -- what it holds ----------------------------------------------------------------------------
 
-    def _described(
+    def _inventory(
         self, datasets: Mapping[str, _Dataset]
     ) -> tuple[dict[str, tuple[str, ...]], dict[str, Quantity]]:
-        named = {name: each for name, each in datasets.items() if each.is_text}
-        coordinates = {name: self._labels(name, each) for name, each in named.items()}
-        numbers = {name: each for name, each in datasets.items() if name not in coordinates}
+        texts = {name: dataset for name, dataset in datasets.items() if dataset.is_text}
+        coordinates = {name: self._labels(name, dataset) for name, dataset in texts.items()}
+        numbers = {name: dataset for name, dataset in datasets.items() if name not in coordinates}
         sizes = {name: len(labels) for name, labels in coordinates.items()}
         if "time" in numbers:
             sizes["time"] = numbers["time"].shape[0]
@@ -399,16 +399,16 @@ class _Reader:
         """Return the quantity of a dataset: from the notation, else from what the file says."""
         if name in QUANTITIES:
             return QUANTITIES[name]
-        facts = self._attributes(dataset.of_h5py(), name)
+        facts = self._attributes(dataset.as_h5py(), name)
         with _readable(self._path, name):
-            dims = tuple(scale.keys()[0] if len(scale) else "" for scale in dataset.of_h5py().dims)
+            dims = tuple(scale.keys()[0] if len(scale) else "" for scale in dataset.as_h5py().dims)
         unit = str(facts.get("units", "1"))
         scale = facts.get("shown_scale", 1.0)
         if isinstance(scale, str) or not math.isfinite(scale):
             raise self.fault(f"{name}.shown_scale", f"found {scale!r}", "a number")
-        words, symbol = str(facts.get("long_name", name)), str(facts.get("symbol", ""))
-        shown, sign = str(facts.get("shown_units", unit)), str(facts.get("comment", ""))
-        return Quantity(name, words, symbol, unit, dims, shown, float(scale), sign)
+        long_name, symbol = str(facts.get("long_name", name)), str(facts.get("symbol", ""))
+        shown_unit, sign = str(facts.get("shown_units", unit)), str(facts.get("comment", ""))
+        return Quantity(name, long_name, symbol, unit, dims, shown_unit, float(scale), sign)
 
     def _floats(self, name: str, dataset: _Dataset) -> Floats:
         if dataset.is_text:
@@ -417,7 +417,7 @@ class _Reader:
             return frozen(dataset.values())
 
     def _profile(self, name: str, dataset: _Dataset) -> Profile:
-        points, facts = self._floats(name, dataset), self._attributes(dataset.of_h5py(), name)
+        points, facts = self._floats(name, dataset), self._attributes(dataset.as_h5py(), name)
         if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
             raise self.fault(name, f"its shape is {points.shape}", "finite points y, z")
         kind, inclination = facts.get("kind"), facts.get("inclination")

@@ -36,7 +36,7 @@ class Sensor:
         return self.offset + self.arm[0]
 
 
-Placed = Mapping[str, Sensor]
+Sensors = Mapping[str, Sensor]
 Motion = Mapping[str, Floats]
 Names = tuple[str, ...]
 
@@ -53,24 +53,24 @@ def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
     bodies = {body.name: body for body in flat.bodies}
     wheelsets = flat.of_kind("wheelset")
     reference = bodies[flat.reference]
-    found: dict[str, tuple[str, tuple[float, float, float]]] = {}
+    points: dict[str, tuple[str, tuple[float, float, float]]] = {}
     if reference.kind != "wheelset":
         places = [w.position[0] for w in carrying(flat)]
         middle = float(np.mean(places))
         front, rear = [x for x in places if x >= middle], [x for x in places if x <= middle]
         height = -(vehicle.service.floor_height if vehicle.service else 1.2)
         for name, x in (("front", np.mean(front)), ("middle", middle), ("rear", np.mean(rear))):
-            found[f"floor_{name}"] = (reference.name, (float(x), 0.0, height))
+            points[f"floor_{name}"] = (reference.name, (float(x), 0.0, height))
     for number, wheelset in enumerate(wheelsets, start=1):
         if (frame := frame_above(flat, wheelset)) is not None:
-            found[f"frame_{number}"] = (frame.name, (wheelset.position[0], 0.0, frame.position[2]))
+            points[f"frame_{number}"] = (frame.name, (wheelset.position[0], 0.0, frame.position[2]))
     for name, point in (vehicle.service.points if vehicle.service else {}).items():
-        found[name] = (point.body, point.position)
+        points[name] = (point.body, point.position)
     origin = reference.position[0]
-    return {name: _placed(bodies[body], point, origin) for name, (body, point) in found.items()}
+    return {name: _sensor_at(bodies[body], point, origin) for name, (body, point) in points.items()}
 
 
-def _placed(body: FlatBody, point: tuple[float, float, float], origin: float) -> Sensor:
+def _sensor_at(body: FlatBody, point: tuple[float, float, float], origin: float) -> Sensor:
     """Return the sensor at a point in vehicle axes; `origin` is that of the distance [m]."""
     x, y, z = body.position
     arm = (point[0] - x, point[1] - y, point[2] - z)
@@ -95,57 +95,57 @@ def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
             arm = (0.0, sign * across, 0.0)
             found[f"axlebox_{number}_{side}"] = Sensor(wheelset.name, x - origin, arm, axlebox=True)
     for name, point in vehicle.sensors.items():
-        found[name] = _placed(bodies[point.body], point.position, origin)
+        found[name] = _sensor_at(bodies[point.body], point.position, origin)
     return found
 
 
 def motions(
-    placed: Placed, motion: Motion, bodies: Names, alignment: Alignment, speed: Floats
+    sensors: Sensors, motion: Motion, bodies: Names, alignment: Alignment, speed: Floats
 ) -> dict[str, Floats]:
     """Displacements, velocities and absolute accelerations of sensors, float64[time, sensor, 3].
 
     Displacements and velocities are those against the moving track frame of the body, in its axes;
     accelerations in the axes of the body.  Arguments as of `readings`.
     """
-    b = [bodies.index(sensor.body) for sensor in placed.values()]
+    b = [bodies.index(sensor.body) for sensor in sensors.values()]
     position, rates, absolute = (motion[f"body_{name}"][:, b] for name in MOTIONS)
-    own = [*placed.values()]
-    attitude, spin, _ = _of_axes(own, position, rates, absolute)
-    _, omega, angular = _of_bodies(own, motion, bodies, alignment, speed)
-    arm = np.array([sensor.arm for sensor in placed.values()]).reshape(-1, 3)
+    ordered = [*sensors.values()]
+    attitude, spin, _ = _axis_motions(ordered, position, rates, absolute)
+    _, omega, angular = _body_readings(ordered, motion, bodies, alignment, speed)
+    arm = np.array([sensor.arm for sensor in sensors.values()]).reshape(-1, 3)
     turned = _out_of_body(np.broadcast_to(arm, (*position.shape[:2], 3)), *attitude)
-    moved = _out_of_body(_cross(spin, arm), *attitude)
-    of_point = absolute[..., :3] + _cross(angular, arm) + _cross(omega, _cross(omega, arm))
+    velocity = _out_of_body(_cross(spin, arm), *attitude)
+    acceleration = absolute[..., :3] + _cross(angular, arm) + _cross(omega, _cross(omega, arm))
     return {
         "sensor_displacement": position[..., :3] + turned - arm,
-        "sensor_velocity": rates[..., :3] + moved,
-        "sensor_absolute_acceleration": of_point,
+        "sensor_velocity": rates[..., :3] + velocity,
+        "sensor_absolute_acceleration": acceleration,
     }
 
 
 def readings(
-    placed: Placed, motion: Motion, bodies: Names, alignment: Alignment, speed: Floats
+    sensors: Sensors, motion: Motion, bodies: Names, alignment: Alignment, speed: Floats
 ) -> tuple[Floats, Floats]:
     """Readings of sensors over time.
 
-    `placed`: Sensors. `motion` (float64[time, ...]): ``distance``, ``body_position``,
+    `sensors` by name. `motion` (float64[time, ...]): ``distance``, ``body_position``,
     ``body_velocity``, ``body_acceleration`` of a result. `bodies`: Names along the dimension
     ``body``. `alignment`: Of the track. `speed` (float64[time]): Speed of the reference body along
     the track [m/s]. Returns `acceleration` (float64[time, sensor, 3]): Reading along x, y, z of
     the body [m/s2]. Returns `roll_rate` (float64[time, sensor]): Absolute roll velocity of the
     body [rad/s].
     """
-    named = tuple(dict.fromkeys((sensor.body, sensor.axlebox) for sensor in placed.values()))
-    first = {key: next(s for s in placed.values() if (s.body, s.axlebox) == key) for key in named}
-    linear, omega, angular = _of_bodies([*first.values()], motion, bodies, alignment, speed)
-    which = [named.index((sensor.body, sensor.axlebox)) for sensor in placed.values()]
-    arm = np.array([sensor.arm for sensor in placed.values()]).reshape(-1, 3)
-    turning = omega[:, which]
-    of_point = _cross(angular[:, which], arm) + _cross(turning, _cross(turning, arm))
-    return linear[:, which] + of_point, turning[..., 0]
+    axes = tuple(dict.fromkeys((sensor.body, sensor.axlebox) for sensor in sensors.values()))
+    first = {key: next(s for s in sensors.values() if (s.body, s.axlebox) == key) for key in axes}
+    linear, omega, angular = _body_readings([*first.values()], motion, bodies, alignment, speed)
+    index = [axes.index((sensor.body, sensor.axlebox)) for sensor in sensors.values()]
+    arm = np.array([sensor.arm for sensor in sensors.values()]).reshape(-1, 3)
+    turning = omega[:, index]
+    swing = _cross(angular[:, index], arm) + _cross(turning, _cross(turning, arm))
+    return linear[:, index] + swing, turning[..., 0]
 
 
-def _of_bodies(
+def _body_readings(
     sensors: Sequence[Sensor], motion: Motion, bodies: Names, alignment: Alignment, speed: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Reading at the centre of gravity, angular velocity and acceleration, all in body axes.
@@ -164,13 +164,13 @@ def _of_bodies(
     pitch_rate = grade_rate * c + kappa * level * sine
     yaw_rate = kappa * level * c - grade_rate * sine
     turning = speed[:, None, None] * np.stack([roll_rate, pitch_rate, yaw_rate], axis=-1)
-    attitude, own, angular = _of_axes(sensors, position, rates, absolute)
+    attitude, spin, angular = _axis_motions(sensors, position, rates, absolute)
     linear = absolute[..., :3] - GRAVITY * _into_body(down, *attitude)
     linear[..., 2] += GRAVITY
-    return linear, own + _into_body(turning, *attitude), angular
+    return linear, spin + _into_body(turning, *attitude), angular
 
 
-def _of_axes(
+def _axis_motions(
     sensors: Sequence[Sensor], position: Floats, rates: Floats, absolute: Floats
 ) -> tuple[tuple[Floats, Floats, Floats], Floats, Floats]:
     """Roll, pitch and yaw, angular velocity and angular acceleration of the axes of sensors.
@@ -180,8 +180,8 @@ def _of_axes(
     spins = np.array([not sensor.axlebox for sensor in sensors])
     turns = np.stack([position[..., 3:], rates[..., 3:], absolute[..., 3:]])
     turns[..., 1] = np.where(spins, turns[..., 1], 0.0)
-    attitude, own, angular = turns
-    return (attitude[..., 0], attitude[..., 1], attitude[..., 2]), own, angular
+    attitude, spin, angular = turns
+    return (attitude[..., 0], attitude[..., 1], attitude[..., 2]), spin, angular
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

@@ -87,9 +87,9 @@ class SinkBefore(Sink):
 
     def close(self, attributes: Attributes, *held: Any, **more: Any) -> Result:
         """See `Sink.close`."""
-        return self._sink.close(self._ended(attributes), *held, **more)
+        return self._sink.close(self._finish(attributes), *held, **more)
 
-    def _ended(self, attributes: Attributes) -> Attributes:
+    def _finish(self, attributes: Attributes) -> Attributes:
         """Hand on what was held back, and return the attributes of the run."""
         return attributes
 
@@ -148,13 +148,13 @@ class MemorySink(Sink):
 
 def full_coordinates(coordinates: Coordinates) -> dict[str, tuple[str, ...]]:
     """Return the coordinates of a run with the ones that are always the same."""
-    known: Coordinates = {"side": SIDES, "component": COMPONENTS}
-    return {name: tuple(labels) for name, labels in {**known, **coordinates}.items()}
+    fixed: Coordinates = {"side": SIDES, "component": COMPONENTS}
+    return {name: tuple(labels) for name, labels in {**fixed, **coordinates}.items()}
 
 
 def matches(name: str, patterns: Iterable[str]) -> bool:
     """Whether a name is one of those given, with ``*`` for any characters."""
-    return any(fnmatchcase(name, one) for one in patterns)
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def timed(quantities: Mapping[str, Quantity]) -> tuple[str, ...]:

@@ -45,18 +45,18 @@ class StoredPeaks(SinkBefore):
                 self.largest[name] = max(self.largest.get(name, 0.0), most)
         self._sink.append(chunk)
 
-    def _ended(self, attributes: Attributes) -> Attributes:
+    def _finish(self, attributes: Attributes) -> Attributes:
         remark = self.remark(self._evaluates)
         remarks = "\n".join(filter(None, [str(attributes.get("remarks", "")), remark]))
         return {**attributes, "remarks": remarks}
 
 
 def lost_peak(
-    stored: Mapping[str, float], of_steps: Mapping[str, Floats], outputs: str, *, filtered: bool
+    stored: Mapping[str, float], step_peaks: Mapping[str, Floats], outputs: str, *, filtered: bool
 ) -> str:
     """Sentence on the peak of which most is lost in what is stored; empty where none loses much.
 
-    `stored`: Largest magnitudes in what is stored. `of_steps`: Largest and smallest values over
+    `stored`: Largest magnitudes in what is stored. `step_peaks`: Largest and smallest values over
     all steps, both of the part that is evaluated. `outputs`: How often is stored, in words.
     `filtered`: Whether what is stored is filtered; then its peaks are those that tables list.
 
@@ -64,20 +64,20 @@ def lost_peak(
     >>> words.split(": ")[0], words.split("; ")[1]
     ('Between two outputs (20 per s) forces peak', 'tables of peaks list the former.')
     """
-    whole = {name: float(np.nanmax(np.abs(of_steps[name]))) for name in stored}
+    whole = {name: float(np.nanmax(np.abs(step_peaks[name]))) for name in stored}
     lost = [name for name in stored if whole[name] - stored[name] > LEAST]
     shares = {name: 1.0 - stored[name] / whole[name] for name in lost}
     name = max(shares, key=lambda name: shares[name], default="")
     if not name or shares[name] <= LOST:
         return ""
     quantity, percent = QUANTITIES[name], f"{100.0 * shares[name]:.0f} %"
-    steps, left = (f"{quantity.text(v)} {quantity.shown_unit}" for v in (whole[name], stored[name]))
+    steps, rest = (f"{quantity.text(v)} {quantity.shown_unit}" for v in (whole[name], stored[name]))
     if filtered:
         return (
-            f"The low pass takes {percent} off the largest {name}: {steps} over all steps, {left} "
+            f"The low pass takes {percent} off the largest {name}: {steps} over all steps, {rest} "
             "in what is stored; tables of peaks list the latter."
         )
     return (
         f"Between two outputs ({outputs}) forces peak: the largest {name} is {steps} over all "
-        f"steps, {left} in the stored histories, {percent} less; tables of peaks list the former."
+        f"steps, {rest} in the stored histories, {percent} less; tables of peaks list the former."
     )

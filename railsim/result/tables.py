@@ -19,12 +19,12 @@ def peak_table(result: Result) -> Table:
     rows = []
     for peak in peaks(result):
         column = Column.of(peak.quantity)
-        words = f"{peak.quantity.words}{KINDS[peak.kind]}"
+        text = f"{peak.quantity.words}{KINDS[peak.kind]}"
         name = peak.labels.get("wheelset", "")
         wheelset = f"{result.wheelsets.index(name) + 1} {name}" if name else ""
         smooth = None if isnan(peak.smooth) else Amount(peak.smooth, column)
-        where = wheelset, peak.labels.get("side", ""), Amount(peak.value, column)
-        rows.append([peak.quantity.name, words, *where, smooth, peak.time, peak.distance])
+        cells = wheelset, peak.labels.get("side", ""), Amount(peak.value, column)
+        rows.append([peak.quantity.name, text, *cells, smooth, peak.time, peak.distance])
     heads = Column("quantity", "Peaks"), Column("words", "largest magnitude")
     values = Column("value", format=">"), Column("low_pass_20_hz", "20 Hz", format=">")
     return Table([*heads, "wheelset", "side", *values, *PLACE], rows)
@@ -42,10 +42,10 @@ def full_curve_table(result: Result, curve: MidCurve) -> Table:
             rows.append([name, quantity.words, side, *cells])
     begin, end = curve.full_curve
     around_words = "median, ± still settling" if curve.settling else "median and scatter"
-    where = f"s = {begin:.1f} to {end:.1f} m: {around_words}"
+    place = f"s = {begin:.1f} to {end:.1f} m: {around_words}"
     if begin == end:
-        where = f"shorter than the vehicle, at its middle, s = {begin:.1f} m: values there"
-    title = f"Full curve R {curve.radius:.6g} m, {where}"
+        place = f"shorter than the vehicle, at its middle, s = {begin:.1f} m: values there"
+    title = f"Full curve R {curve.radius:.6g} m, {place}"
     numbers = [Column(str(index + 1), format=">") for index in range(len(result.wheelsets))]
     columns = [Column("quantity", " "), Column("words", "wheelset"), Column("side")]
     return Table([*columns, *numbers], rows, title)
@@ -65,8 +65,8 @@ def full_curves_table(result: Result, curves: Sequence[MidCurve]) -> Table:
     for curve in curves:
         largest = {peak.quantity.name: peak.value for peak in curve.median_peaks}
         begin, end = curve.full_curve
-        where = f"{curve.radius:.6g} m", f"{begin:.1f} to {end:.1f}"
-        rows.append([*where, *map(largest.get, names)])
+        ends = f"{curve.radius:.6g} m", f"{begin:.1f} to {end:.1f}"
+        rows.append([*ends, *map(largest.get, names)])
     heads = (
         Column("radius", "Full curves, largest medians"),
         Column("distance", "s (m)", format=">"),
