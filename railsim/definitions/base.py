@@ -60,8 +60,8 @@ def pair(value: Any) -> Any:
 
 def one_or_two(member: dict[str, Any]) -> WithJsonSchema:
     """Schema of one value or a pair."""
-    both = {"type": "array", "items": member, "minItems": 2, "maxItems": 2}
-    return WithJsonSchema({"anyOf": [member, both]})
+    pair = {"type": "array", "items": member, "minItems": 2, "maxItems": 2}
+    return WithJsonSchema({"anyOf": [member, pair]})
 
 
 def both_sides(share: float = 1.0) -> BeforeValidator:
@@ -123,14 +123,14 @@ T = TypeVar("T")
 S = TypeVar("S")
 
 
-def kept(definition: "Definition", name: str, make: Callable[[], T]) -> T:
+def once(definition: "Definition", name: str, make: Callable[[], T]) -> T:
     """Return what follows from a definition alone, made once; a copy of it has it no more."""
     stored = definition.__dict__
     if name not in stored:
         value = make()
         stored[name] = lambda: value  # equal to itself alone: arrays have no truth value
-    found: T = stored[name]()
-    return found
+    result: T = stored[name]()
+    return result
 
 
 class Definition(BaseModel):
@@ -163,7 +163,7 @@ def meanings(model: type[BaseModel]) -> dict[str, str]:
 
     It is read from the source on first use: at import it would cost every command a tenth.
     """
-    found: dict[str, str] = {}
+    meanings: dict[str, str] = {}
     for part in reversed(model.__mro__):
         if not issubclass(part, Definition):
             continue
@@ -173,10 +173,10 @@ def meanings(model: type[BaseModel]) -> dict[str, str]:
             match field, text:
                 case (
                     ast.AnnAssign(target=ast.Name(id=name)),
-                    ast.Expr(value=ast.Constant(value=str(said))),
+                    ast.Expr(value=ast.Constant(value=str(meaning))),
                 ):
-                    found[name] = inspect.cleandoc(said)
-    return found
+                    meanings[name] = inspect.cleandoc(meaning)
+    return meanings
 
 
 @dataclass(frozen=True)
@@ -215,9 +215,9 @@ def holds(condition: Callable[[Any], bool], otherwise: str) -> AfterValidator:
     return AfterValidator(check)
 
 
-def rises(what: str) -> AfterValidator:
-    """Return the check that the first column of rows, called `what`, increases strictly."""
-    return holds(rising, f"the {what} must increase from row to row")
+def rises(column: str) -> AfterValidator:
+    """Return the check that the first column of rows, called `column`, increases strictly."""
+    return holds(rising, f"the {column} must increase from row to row")
 
 
 def rising(rows: Sequence[Sequence[float]]) -> bool:
@@ -243,12 +243,12 @@ def kinds(base: type[D], key: str, package: str) -> dict[str, type[D]]:
     """Return all definitions in the modules of a package that give `key` one value, by it."""
     for module in iter_modules([str(Path(str(import_module(package).__file__)).parent)]):
         import_module(f"{package}.{module.name}")
-    found: dict[str, type[D]] = {}
+    by_value: dict[str, type[D]] = {}
     waiting: list[Any] = [base]
     while waiting:
-        one = waiting.pop()
-        waiting += one.__subclasses__()
-        annotation = one.model_fields[key].annotation if key in one.model_fields else None
+        kind = waiting.pop()
+        waiting += kind.__subclasses__()
+        annotation = kind.model_fields[key].annotation if key in kind.model_fields else None
         if get_origin(annotation) is Literal:
-            found[get_args(annotation)[0]] = one
-    return dict(sorted(found.items()))
+            by_value[get_args(annotation)[0]] = kind
+    return dict(sorted(by_value.items()))

@@ -33,6 +33,6 @@ def embed(
             with faults.caught():
                 read(key, table)
         else:
-            shown = shortened(table["file"], LONGEST_FILE)
-            faults.append(Fault("", f"{key}.file", f"no file '{shown}'", allowed))
+            file = shortened(table["file"], LONGEST_FILE)
+            faults.append(Fault("", f"{key}.file", f"no file '{file}'", allowed))
     return faults

@@ -47,8 +47,8 @@ def validation_faults(
 def _name_in_base(path: tuple[str, ...], source: Source) -> str:
     """Return the near name of a member that another file of the chain has, as a question."""
     siblings = {keys for keys in source.origin if keys[:-1] == path[:-1]}
-    own = source.file_of(path)
-    names = [keys[-1] for keys in siblings if source.file_of(keys) != own]
+    file = source.file_of(path)
+    names = [keys[-1] for keys in siblings if source.file_of(keys) != file]
     hint = nearest(path[-1], names)
     return f"; {hint}" if names and not hint.startswith("allowed") else ""
 
@@ -72,8 +72,8 @@ def _written_path(detail: Any, data: Any) -> tuple[str, ...]:
     node = data
     location, last = detail["loc"], len(detail["loc"]) - 1
     for depth, item in enumerate(location):
-        known = range(len(node)) if isinstance(node, list) else node
-        if isinstance(node, dict | list) and item in known:
+        choices = range(len(node)) if isinstance(node, list) else node
+        if isinstance(node, dict | list) and item in choices:
             node = node[item]
         elif not (isinstance(node, dict) and depth == last and detail["type"] == "missing"):
             continue
@@ -93,49 +93,49 @@ def _wording(detail: Any, model: type[BaseModel]) -> tuple[str, str]:
             return "unknown key", nearest(str(detail["loc"][-1]), fields)
         case "union_tag_invalid":
             tags = [tag.strip(" '") for tag in context["expected_tags"].split(",")]
-            found = f"unknown {context['discriminator']} {_shown(context['tag'])}"
+            found = f"unknown {context['discriminator']} {_quoted(context['tag'])}"
             return found, nearest(context["tag"], tags)
         case "union_tag_not_found":
             return f"no key {context['discriminator']}", "it tells what the table describes"
         case "string_pattern_mismatch":
-            return _shown(value), "a name: letters, digits, _ and -, beginning with a letter"
+            return _quoted(value), "a name: letters, digits, _ and -, beginning with a letter"
         case "tuple_type":
-            return _shown(value), _list_of(_annotation_at(model, detail["loc"]))
+            return _quoted(value), _list_text(_annotation_at(model, detail["loc"]))
         case "too_long" | "too_short" if isinstance(value, list | tuple):
-            allowed = _list_of(_annotation_at(model, detail["loc"]))
+            allowed = _list_text(_annotation_at(model, detail["loc"]))
             if allowed == "a list" and kind == "too_short":
                 allowed = f"a list of {context['min_length']} at least"
             elif allowed == "a list":
                 allowed = f"a list of {context['max_length']} at most"
-            return _counted(value), allowed
+            return _count_text(value), allowed
         case "model_type" | "model_attributes_type" | "dict_type":
-            return _shown(value), "must be a table"
+            return _quoted(value), "must be a table"
         case "value_error":
             message = message.removeprefix("Value error, ")
             if isinstance(value, dict) or len(repr(value)) > 60:
                 return message, ""
-    return _shown(value), message
+    return _quoted(value), message
 
 
 def _missing(detail: Any, model: type[BaseModel]) -> tuple[str, str]:
     if isinstance(detail["input"], list | tuple):
-        return _counted(detail["input"]), _list_of(_annotation_at(model, detail["loc"][:-1]))
+        return _count_text(detail["input"]), _list_text(_annotation_at(model, detail["loc"][:-1]))
     *parents, name = detail["loc"]
     owner = _annotation_at(model, parents)
-    said = meanings(owner).get(str(name), "") if str(name) in _fields(owner) else ""
-    meaning = " ".join(said.split())
+    text = meanings(owner).get(str(name), "") if str(name) in _fields(owner) else ""
+    meaning = " ".join(text.split())
     return "missing", f"needed: {meaning}" if meaning else "needed"
 
 
-def _shown(value: object) -> str:
+def _quoted(value: object) -> str:
     return shortened(repr(value))
 
 
-def _counted(value: Sequence[object]) -> str:
+def _count_text(value: Sequence[object]) -> str:
     return f"{len(value)} value" if len(value) == 1 else f"{len(value)} values"
 
 
-def _list_of(annotation: Any) -> str:
+def _list_text(annotation: Any) -> str:
     members = typing.get_args(annotation)
     if typing.get_origin(annotation) is not tuple or Ellipsis in members:
         return "a list"

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self, TypeVar, get_args
 import tomli_w
 from pydantic import ValidationError
 
-from railsim.definitions.base import Definition, Remark, kept
+from railsim.definitions.base import Definition, Remark, once
 from railsim.definitions.faults import validation_faults
 from railsim.errors import Fault, InputError
 from railsim.files.access import check_file, write_text
@@ -79,7 +79,7 @@ class FileDefinition(Definition):
     def to_toml(self) -> str:
         """Return the whole definition as TOML text, defaults included, `extends` resolved."""
         # a study asks for it once for every run
-        return kept(self, "_toml", lambda: tomli_w.dumps(self.model_dump(exclude_none=True)))
+        return once(self, "_toml", lambda: tomli_w.dumps(self.model_dump(exclude_none=True)))
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the definition as a file, which appears when it is whole.
@@ -123,15 +123,15 @@ class FileDefinition(Definition):
     def __reduce__(self) -> tuple[Any, ...]:
         # its values alone, without what was worked out
         values = {name: self.__dict__[name] for name in type(self).model_fields}
-        given = self.model_fields_set
-        return restored, (type(self), kept(self, "_pickled", lambda: pickle.dumps((given, values))))
+        keys = self.model_fields_set
+        return restored, (type(self), once(self, "_pickled", lambda: pickle.dumps((keys, values))))
 
     def __repr__(self) -> str:
         kind, name = type(self).__name__, getattr(self, "name", None)
         if name:
             return f"<{kind} {printable(name)!r}>"
-        own = self.model_dump(exclude_defaults=True, exclude={"format"})
-        values = shortened(", ".join(f"{key}={value!r}" for key, value in own.items()))
+        fields = self.model_dump(exclude_defaults=True, exclude={"format"})
+        values = shortened(", ".join(f"{key}={value!r}" for key, value in fields.items()))
         return f"<{kind}: {printable(values) or 'defaults'}>"
 
     __str__ = __repr__
@@ -144,9 +144,9 @@ class FileDefinition(Definition):
 
     def _table(self) -> Table:
         """Return the table that a notebook shows: keys and their values."""
-        shown = self.model_dump(exclude_none=True, exclude={"format", "name"})
+        entries = self.model_dump(exclude_none=True, exclude={"format", "name"})
         rows: list[list[object]] = []
-        for key, value in shown.items():
+        for key, value in entries.items():
             if isinstance(value, dict | list | tuple) and len(str(value)) > LONGEST_VALUE:
                 value = f"{len(value)} entries"
             rows.append([key, value])
@@ -164,8 +164,8 @@ def restored(kind: type[D], pickled: bytes) -> D:
 
     A process of a study gets a vehicle with each of its runs.
     """
-    given, values = pickle.loads(pickled)
-    return kind.model_construct(given, **values)
+    fields, values = pickle.loads(pickled)
+    return kind.model_construct(fields, **values)
 
 
 def loaded(model: type[D], source: Source, overrides: Iterable[str] | str) -> D:
@@ -202,5 +202,5 @@ def validated(model: type[D], source: Source) -> D:
 
 def format_fault(file: str, found: object, allowed: Iterable[str]) -> Fault:
     """Return the fault of a file whose `format` is another."""
-    named = "missing" if found is None else shortened(repr(found))
-    return Fault(file, "format", named, "allowed: " + ", ".join(allowed))
+    text = "missing" if found is None else shortened(repr(found))
+    return Fault(file, "format", text, "allowed: " + ", ".join(allowed))

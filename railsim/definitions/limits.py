@@ -88,9 +88,9 @@ class ByZone(Sourced):
     values: tuple[base.Positive, base.Positive, base.Positive, base.Positive]
     """Limits in the zones 1 to 4 [SI]"""
 
-    def at(self, place: Situation) -> float:
+    def at(self, situation: Situation) -> float:
         """Return the limit [SI]."""
-        return self.values[int(place.zone) - 1]
+        return self.values[int(situation.zone) - 1]
 
 
 class ByAxleLoad(Sourced):
@@ -105,9 +105,9 @@ class ByAxleLoad(Sourced):
     k1: dict[base.Text, base.Positive] = Field(min_length=1)
     """Factor by category of the vehicle [1]"""
 
-    def at(self, place: Situation) -> float:
+    def at(self, situation: Situation) -> float:
         """Return the limit [N]."""
-        return self.k1[place.service.category] * (self.constant + self.factor * place.Q0)
+        return self.k1[situation.service.category] * (self.constant + self.factor * situation.Q0)
 
 
 class ByWheelLoad(Sourced):
@@ -122,10 +122,10 @@ class ByWheelLoad(Sourced):
     above: base.Positive
     """Beyond the last row [N]"""
 
-    def at(self, place: Situation) -> float:
+    def at(self, situation: Situation) -> float:
         """Return the limit [N]."""
-        speed = place.service.admissible_speed
-        return min(self.constant + place.Q0, up_to(self.by_speed, speed, self.above))
+        speed = situation.service.admissible_speed
+        return min(self.constant + situation.Q0, up_to(self.by_speed, speed, self.above))
 
 
 class ByRadius(Sourced):
@@ -138,9 +138,9 @@ class ByRadius(Sourced):
     numerator: base.NonNegative
     """[N m]"""
 
-    def at(self, place: Situation) -> float:
+    def at(self, situation: Situation) -> float:
         """Return the limit [N]."""
-        return self.constant + self.numerator / place.radius
+        return self.constant + self.numerator / situation.radius
 
 
 class ByBogieMass(Sourced):
@@ -153,10 +153,10 @@ class ByBogieMass(Sourced):
     slope: base.NonNegative
     """Per mass of the bogie [m/s2/kg]"""
 
-    def at(self, place: Situation) -> float:
+    def at(self, situation: Situation) -> float:
         """Return the limit [m/s2]."""
-        flat = flatten(place.vehicle)
-        wheelset = flat.of_kind("wheelset")[place.wheelset or 0]
+        flat = flatten(situation.vehicle)
+        wheelset = flat.of_kind("wheelset")[situation.wheelset or 0]
         return self.constant - self.slope * bogie_mass(flat, wheelset)
 
 
@@ -170,9 +170,9 @@ class Share(Sourced):
     of: base.Text
     """Name of the other limit"""
 
-    def at(self, place: Situation) -> float:
+    def at(self, situation: Situation) -> float:
         """Return the limit [SI]."""
-        return self.value * place.limits[self.of].at(place)
+        return self.value * situation.limits[self.of].at(situation)
 
 
 LimitLaw = Annotated[
@@ -444,12 +444,12 @@ class WheelLimits(FileDefinition):
 
     def reached(self, dimensions: Mapping[str, float]) -> str:
         """Return which limits are reached, in words; empty for none."""
-        found = []
+        texts = []
         for name, value in dimensions.items():
             limit = getattr(self, name).value
             largest = name in ("flange_height", "hollow")
             if (value >= limit) if largest else (value <= limit):
-                found.append(
+                texts.append(
                     f"{name.replace('_', ' ')} {1e3 * value:.1f} mm, limit {1e3 * limit:g}"
                 )
-        return "; ".join(found)
+        return "; ".join(texts)

@@ -60,8 +60,8 @@ FORMATS = {
 
 def definition_of(format_name: str) -> type[FileDefinition]:
     """Return the definition of a format, imported when it is asked for."""
-    found: type[FileDefinition] = resolve_name(f"railsim.definitions.{FORMATS[format_name]}")
-    return found
+    definition: type[FileDefinition] = resolve_name(f"railsim.definitions.{FORMATS[format_name]}")
+    return definition
 
 
 def load(model: type[D], path: str | Path, overrides: Overrides = ()) -> D:
@@ -171,11 +171,11 @@ def load_wear_law(path: str | Path) -> "WearLawFile":
 
 def load_own_sections(path: str | Path) -> "OwnSections":
     """Load test sections of the user's own: TOML, or CSV with the keys of a section as header."""
-    from railsim.definitions.own_sections import OwnSections, of_csv
+    from railsim.definitions.own_sections import OwnSections, parse_csv
 
     path, data = Path(path), None
     if path.suffix.lower() == ".csv":
-        data = of_csv(read_text(path, DEFINITION_BYTES))
+        data = parse_csv(read_text(path, DEFINITION_BYTES))
     return loaded(OwnSections, sources.read_source(path, "sections", data), ())
 
 
@@ -229,8 +229,8 @@ def check_types(vehicles: Sequence[object], *tracks: object, settings: object = 
 
     `settings`: None, where there need not be any.
     """
-    wrong = [wrong_type("vehicle", one) for one in vehicles if not isinstance(one, Vehicle)]
-    wrong += [wrong_type("track", one) for one in tracks if not isinstance(one, Track)]
+    wrong = [wrong_type("vehicle", x) for x in vehicles if not isinstance(x, Vehicle)]
+    wrong += [wrong_type("track", x) for x in tracks if not isinstance(x, Track)]
     if not isinstance(settings, Settings | None):
         wrong.append(wrong_type("settings", settings))
     if wrong:

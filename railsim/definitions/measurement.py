@@ -177,7 +177,7 @@ class MeasurementFile(FileDefinition):
     @base.check
     def _axes(self) -> None:
         used = [channel.quantity for channel in self.channels.values()]
-        twice = sorted({one for one in used if used.count(one) > 1})
+        twice = sorted({quantity for quantity in used if used.count(quantity) > 1})
         if twice:
             raise ValueError(f"two channels of {twice[0]}: name another point, or leave one out")
         if ("time" in used) == (self.rate is not None):

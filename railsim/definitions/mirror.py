@@ -100,14 +100,14 @@ def _across(part: Part, boxes: Set[str]) -> Part:
 
 def _rolling_back(group: Part) -> Part:
     """Return a vehicle or an assembly whose wheels roll the other way."""
-    given: Any = group
+    vehicle: Any = group
     wheelsets = {
         name: wheelset.model_copy(
             update={"out_of_round": {k: v.backwards() for k, v in wheelset.out_of_round.items()}}
         )
-        for name, wheelset in given.wheelsets.items()
+        for name, wheelset in vehicle.wheelsets.items()
     }
-    assemblies = {name: _rolling_back(inner) for name, inner in given.assemblies.items()}
+    assemblies = {name: _rolling_back(inner) for name, inner in vehicle.assemblies.items()}
     return group.model_copy(update={"wheelsets": wheelsets, "assemblies": assemblies})
 
 
@@ -117,9 +117,9 @@ def _along(part: Part) -> Part:
     for name, value in part:
         match name, value:
             case ("placements", _):
-                placed = (_reflected(one, ALONG) for one in value)
-                turned = [one.model_copy(update={"mirror": not one.mirror}) for one in placed]
-                return part.model_copy(update={name: tuple(turned)})
+                reflected = (_reflected(p, ALONG) for p in value)
+                mirrored = [p.model_copy(update={"mirror": not p.mirror}) for p in reflected]
+                return part.model_copy(update={name: tuple(mirrored)})
             case ("service", Definition()):
                 update[name] = _along(value)
             case (_, dict()) if name in (*TABLES, "points") and not isinstance(part, LoadGroup):

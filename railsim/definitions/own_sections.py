@@ -43,22 +43,22 @@ class OwnSections(FileDefinition):
 
     def contradictions(self) -> list[Fault]:
         """Return sections too short for means over 2 m, and those that overlap on a track."""
-        each = list(enumerate(self.sections))
-        ends = [(f"sections.{k}.end", one.end, one.begin + SHORTEST) for k, one in each]
-        found = [
+        numbered = list(enumerate(self.sections))
+        ends = [(f"sections.{k}.end", part.end, part.begin + SHORTEST) for k, part in numbered]
+        faults = [
             Fault("", key, f"{end:.12g} m", f"{least:.12g} m at least")
             for key, end, least in ends
             if end < least
         ]
-        for (k, one), (n, other) in combinations(each, 2):
-            same = one.track == other.track or None in (one.track, other.track)
-            if same and one.begin < other.end and other.begin < one.end:
+        for (k, part), (n, other) in combinations(numbered, 2):
+            same = part.track == other.track or None in (part.track, other.track)
+            if same and part.begin < other.end and other.begin < part.end:
                 words = f"{other.begin:g} to {other.end:g} m", f"outside sections.{k}"
-                found.append(Fault("", f"sections.{n}", *words))
-        return found
+                faults.append(Fault("", f"sections.{n}", *words))
+        return faults
 
 
-def of_csv(text: str) -> dict[str, Any]:
+def parse_csv(text: str) -> dict[str, Any]:
     """Return the tables of a file of a section a line, comma or semicolon, keys as header."""
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     separator = ";" if ";" in "".join(lines[:1]) else ","

@@ -46,16 +46,16 @@ def read_sections(path: str | Path, kind: str) -> SectionList:
     increase; a section is no contour.
     """
     path = Path(path)
-    suffix, own = path.suffix.lower(), ".slcs" if kind == "rail" else ".slcw"
-    if suffix not in (own, ".csv"):
-        raise input_error(path, f"unknown kind of file '{path.suffix}'", f"{own} or .csv")
+    suffix, ending = path.suffix.lower(), ".slcs" if kind == "rail" else ".slcw"
+    if suffix not in (ending, ".csv"):
+        raise input_error(path, f"unknown kind of file '{path.suffix}'", f"{ending} or .csv")
     text = read_text(path, TABLE_BYTES)
     if suffix == ".csv":
         positions, points = _own_list(path, text, kind)
     else:
         positions, names = _slc(path, text, 1.0 if kind == "wheel" else 1e-3)
-        read = {name: _section(path, name) for name in dict.fromkeys(names)}
-        points = [read[name] for name in names]
+        sections = {name: _section(path, name) for name in dict.fromkeys(names)}
+        points = [sections[name] for name in names]
     if len(positions) < 2 or len(positions) > MOST_SECTIONS:
         raise input_error(path, f"{len(positions)} sections", f"2 to {MOST_SECTIONS}")
     for before, after in pairwise(positions):
@@ -73,18 +73,18 @@ def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str]]:
     ]
     rows = iter(lines)
 
-    def numbers(what: str, least: int, row: tuple[int, str] | None = None) -> list[float]:
+    def numbers(expected: str, least: int, row: tuple[int, str] | None = None) -> list[float]:
         number, line = row or next(rows, (0, ""))
-        found: list[float] = []
+        values: list[float] = []
         for word in re.split(r"[\s,]+", line):
             try:
-                found.append(float(word))
+                values.append(float(word))
             except ValueError:
                 break
-        if len(found) < least or not np.isfinite(found).all():
+        if len(values) < least or not np.isfinite(values).all():
             shown = shortened(line) if line else "the end of the file"
-            raise input_error(path, f"'{shown}'", what, f"line {number}" if number else "")
-        return found
+            raise input_error(path, f"'{shown}'", expected, f"line {number}" if number else "")
+        return values
 
     offset, scale = numbers("offset and scale of the positions", 2)[:2]
     if scale == 0.0:
@@ -114,23 +114,23 @@ def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Float
     if not listed and not {key, "y", "z"} <= {*columns}:
         allowed = f"{key}, file, or {key}, y, z"
         raise input_error(path, f"columns {', '.join(columns)}", allowed)
-    at, *of = map(columns.index, (key, "file") if listed else (key, "y", "z"))
-    found: dict[float, list[list[float]]] = {}
+    place, *rest = map(columns.index, (key, "file") if listed else (key, "y", "z"))
+    sections: dict[float, list[list[float]]] = {}
     files: list[tuple[float, str]] = []
     for row in table:
         try:
-            position, *point = (float(row[k]) for k in ([at] if listed else [at, *of]))
-            files.append((position, row[of[0]].strip()))
+            position, *point = (float(row[k]) for k in ([place] if listed else [place, *rest]))
+            files.append((position, row[rest[0]].strip()))
         except (IndexError, ValueError):
             position, point = np.nan, []
         if not np.isfinite([position, *point]).all():
             shown = ", ".join(row)
             allowed = f"{key}, file" if listed else f"numbers {key}, y, z"
             raise input_error(path, f"row '{shortened(shown)}'", allowed)
-        found.setdefault(position, []).append(point)
+        sections.setdefault(position, []).append(point)
     if listed:
         return [position for position, _ in files], [_section(path, name) for _, name in files]
-    return list(found), [_checked(path, np.array(points).T) for points in found.values()]
+    return list(sections), [_checked(path, np.array(points).T) for points in sections.values()]
 
 
 def _section(path: Path, name: str) -> Floats:
@@ -170,22 +170,22 @@ def _checked(file: Path, points: Floats) -> Floats:
 
 def embed_wheel_sections(data: dict[str, Any]) -> list[Fault]:
     """Replace `file` by what it holds for every wheel with sections in the tables of a vehicle."""
-    return embed(_uneven(data), "", "a list of sections, .slcw", _embed)
+    return embed(_section_wheels(data), "", "a list of sections, .slcw", _embed)
 
 
-def _uneven(group: Any) -> Iterator[tuple[str, Any]]:
-    for at, wheelset in tables_of(group, "wheelsets"):
+def _section_wheels(group: Any) -> Iterator[tuple[str, Any]]:
+    for path, wheelset in tables_of(group, "wheelsets"):
         for key, table in tables_of(wheelset, "out_of_round"):
             if table.get("type") == "sections":
-                yield f"{at}.{key}", table
-    for at, assembly in tables_of(group, "assemblies"):
-        yield from ((f"{at}.{key}", table) for key, table in _uneven(assembly))
+                yield f"{path}.{key}", table
+    for path, assembly in tables_of(group, "assemblies"):
+        yield from ((f"{path}.{key}", table) for key, table in _section_wheels(assembly))
 
 
 def _embed(_: str, table: dict[str, Any]) -> None:
-    found = wheel_heights(read_sections(table["file"], "wheel"))
+    heights = wheel_heights(read_sections(table["file"], "wheel"))
     del table["file"]
-    table |= dict(zip(("angles", "positions", "heights"), found, strict=True))
+    table |= dict(zip(("angles", "positions", "heights"), heights, strict=True))
 
 
 SMOOTHING_ACROSS = 5e-9  # m3

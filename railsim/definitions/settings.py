@@ -207,11 +207,11 @@ class Settings(FileDefinition):
 
     def unusual(self) -> list[base.Remark]:
         """Return values beside which another takes their place."""
-        found, grid = self.drive.unusual(), type(self).model_fields["fastsim_grid"].default
+        remarks, grid = self.drive.unusual(), type(self).model_fields["fastsim_grid"].default
         gridded = CREEP_LAWS[self.creep_law].grid and self.own_creep_law is None
         if not gridded and self.fastsim_grid != grid:
-            found.append(base.Remark("fastsim_grid", "has no effect: the creep law has no cells"))
-        return found
+            remarks.append(base.Remark("fastsim_grid", "has no effect: the creep law has no cells"))
+        return remarks
 
     @base.check
     def _physical(self) -> None:
@@ -224,13 +224,13 @@ class Settings(FileDefinition):
             raise ValueError(
                 "'adhesion_curve' belongs to creep_law = \"adhesion_curve\" and only to it"
             )
-        asked = self.outputs.low_pass
-        if asked is not None:
-            least = LEAST_RATE[asked.phase] * asked.frequency
+        low_pass = self.outputs.low_pass
+        if low_pass is not None:
+            least = LEAST_RATE[low_pass.phase] * low_pass.frequency
             if self.output_spacing is not None or self.drive.mode != "constant":
                 raise ValueError("'outputs.low_pass' needs a constant speed and 'output_rate'")
             if self.output_rate < least * (1.0 - 1e-9):
                 raise ValueError(
                     f"'output_rate' must be {least:.12g} at least with 'outputs.low_pass' of "
-                    f"{asked.frequency:g} Hz"
+                    f"{low_pass.frequency:g} Hz"
                 )

@@ -289,8 +289,8 @@ class TrailingArmSuspension(FileDefinition):
     @property
     def springs(self) -> dict[str, HelicalSpring]:
         """The springs by name, outer first."""
-        both = {"outer": self.outer, "inner": self.inner}
-        return {name: spring for name, spring in both.items() if spring is not None}
+        pair = {"outer": self.outer, "inner": self.inner}
+        return {name: spring for name, spring in pair.items() if spring is not None}
 
     @property
     def engagement(self) -> float:
@@ -338,19 +338,19 @@ class TrailingArmSuspension(FileDefinition):
 
 def _load_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
     loads, fatigue = suspension.loads, suspension.fatigue
-    named = [(f"load_notes.{name}", name) for name in suspension.load_notes]
+    references = [(f"load_notes.{name}", name) for name in suspension.load_notes]
     if suspension.checks.solid_load is not None:
-        named.append(("checks.solid_load", suspension.checks.solid_load))
+        references.append(("checks.solid_load", suspension.checks.solid_load))
     if suspension.vehicle is not None:
-        named.append(("vehicle.load", suspension.vehicle.load))
+        references.append(("vehicle.load", suspension.vehicle.load))
     if fatigue is not None:
         highest, lowest = fatigue.max_load, fatigue.min_load
         if None in (highest, lowest) or fatigue.tare != TARE:
-            named.append(("fatigue.tare", fatigue.tare))
+            references.append(("fatigue.tare", fatigue.tare))
         if highest is not None and lowest is not None and highest <= lowest:
             found = f"{highest:.12g} N is not above fatigue.min_load {lowest:.12g} N"
             yield Fault("", "fatigue.max_load", found, "the highest dynamic load")
-    for key, name in named:
+    for key, name in references:
         if name not in loads:
             yield Fault("", key, f"no load '{name}' in [loads]", nearest(name, loads))
 

@@ -22,20 +22,20 @@ def unit_of_key(definition: Definition, key: str) -> str:
     ['N/m', 'kg', '']
     """
     node: Any = definition
-    said = ""
+    meaning = ""
     try:
         for part in full_path(definition.model_dump(mode="json"), key_path(key)):
             if isinstance(node, Definition):
-                said, node = meanings(type(node)).get(part, ""), getattr(node, part)
+                meaning, node = meanings(type(node)).get(part, ""), getattr(node, part)
             elif isinstance(node, Mapping):
                 node = node[part]
             else:
-                named = [getattr(member, "name", None) for member in node]
-                indices = named if part in named else [str(i) for i in range(len(node))]
+                names = [getattr(member, "name", None) for member in node]
+                indices = names if part in names else [str(i) for i in range(len(node))]
                 node = node[AXES.index(part) if part in AXES else indices.index(part)]
     except (KeyError, ValueError, TypeError, AttributeError, IndexError):
         return ""
-    units = re.findall(r"\[([^\]]*)\]", said)
+    units = re.findall(r"\[([^\]]*)\]", meaning)
     return units[0] if len(units) == 1 and UNIT.fullmatch(units[0]) else ""
 
 
@@ -44,6 +44,6 @@ def unit_of_input(inputs: Any, key: str) -> str:
 
     `inputs`: With these three as attributes.
     """
-    kind, _, own = key.partition(".")
-    known = own and kind in ("vehicle", "track", "settings")
-    return unit_of_key(getattr(inputs, kind), own) if known else ""
+    kind, _, inner = key.partition(".")
+    is_input = inner and kind in ("vehicle", "track", "settings")
+    return unit_of_key(getattr(inputs, kind), inner) if is_input else ""

@@ -19,7 +19,7 @@ from railsim.contact.stored_table import cached_contact_table
 from railsim.contact.table import ContactTable
 from railsim.contact.zones import covered_widening
 from railsim.definitions import Settings, Track, Vehicle
-from railsim.definitions.base import kept
+from railsim.definitions.base import once
 from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Drive as DriveDefinition
 from railsim.definitions.track.layout import is_straight_and_level
@@ -156,7 +156,7 @@ def assemble(
     if vehicle.laws:  # whose blocks the loop writes into: each model has its own
         system, index = _suspension(flat, vehicle.laws)
     else:
-        system, index = kept(vehicle, "_suspension", lambda: _suspension(flat))
+        system, index = once(vehicle, "_suspension", lambda: _suspension(flat))
     system = system._replace(
         track=track_tables(track),
         support=support_arrays(track.support, track.rail_base),

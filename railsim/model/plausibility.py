@@ -15,7 +15,7 @@ from railsim.arrays import Floats
 from railsim.constants import FASTEST
 from railsim.contact.gauges import wheel_gauge
 from railsim.definitions import Track, Vehicle
-from railsim.definitions.base import Remark, kept
+from railsim.definitions.base import Remark, once
 from railsim.definitions.elements.base import Element, FreeLength, two_sided
 from railsim.definitions.elements.friction import SideBearer
 from railsim.definitions.elements.springs import BumpStop, SpringDamper
@@ -77,7 +77,7 @@ def vehicle_remarks(
     >>> print(vehicle_remarks(coach)[0])
     carbody: a moment of inertia is above the sum of the other two: Ixx, Iyy, Izz in this order?
     """
-    found = kept(vehicle, "_remarks_without_supports", lambda: _without_supports(vehicle))
+    found = once(vehicle, "_remarks_without_supports", lambda: _without_supports(vehicle))
     return [*found, *(_supports(vehicle, balanced) if supports else ())]
 
 

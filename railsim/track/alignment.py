@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from railsim.arrays import Floats
 from railsim.constants import CANT_BASE
 from railsim.definitions import Track
-from railsim.definitions.base import kept
+from railsim.definitions.base import once
 from railsim.definitions.track import layout
 from railsim.definitions.track.elements import Section
 from railsim.definitions.track.rounded_profile import RoundedProfile
@@ -103,7 +103,7 @@ def alignment_of(track: Track) -> Alignment:
 
     Raises InputError: elements that do not fit together.
     """
-    return kept(track, "_alignment", lambda: Alignment(track))
+    return once(track, "_alignment", lambda: Alignment(track))
 
 
 def _magnitudes(sections: Sequence[Section]) -> list[Section]:

@@ -61,8 +61,8 @@ class CommandedElement(PointElement):
     def act(self, **values: object) -> Act:
         """Return what it becomes, with the values of its kind."""
         same = "lag", "delay", "rate_limit", "force_limit", "power_limit", "stroke"
-        own: Any = {name: getattr(self, name) for name in same} | values
-        return Act(action=self.acts, sense=-1.0 if self.against_axis else 1.0, **own)
+        fields: Any = {name: getattr(self, name) for name in same} | values
+        return Act(action=self.acts, sense=-1.0 if self.against_axis else 1.0, **fields)
 
 
 class Actuator(CommandedElement):

@@ -176,8 +176,8 @@ class FreeLength(PairElement):
         if self.free_length is not None:
             return stiffness * (self.free_length - length)
         assert self.load_at_length is not None  # by `has_free_length`
-        load, at = self.load_at_length
-        return load + stiffness * (at - length)
+        load, reference = self.load_at_length
+        return load + stiffness * (reference - length)
 
     @base.check
     def _one_origin_of_the_preload(self) -> None:
@@ -241,5 +241,5 @@ class VerticalSpring(PreloadAlongAxes, FreeLength):
 
     def mount(self, **more: Any) -> Mount:
         """The row of its spring with what a kind adds."""
-        own = {"stiffness": self.stiffness, "damping": self.damping, "preload": self.known_preload}
-        return Mount(**own | more)
+        row = {"stiffness": self.stiffness, "damping": self.damping, "preload": self.known_preload}
+        return Mount(**row | more)

@@ -203,18 +203,18 @@ class CentrePlate(SlidingFriction, PairElement):
 
     def parts(self) -> list[tuple[str, base.Vector, Element]]:
         """Pads that carry the plate: suffix of the name, offset from the centre [m], pad."""
-        found: list[tuple[str, base.Vector, Element]] = []
-        same = "bodies", "friction_coefficient", "sliding_ratio", "stribeck_speed"
-        of_each = "stiffness", "damping", "stick_stiffness", "preload"
+        pads: list[tuple[str, base.Vector, Element]] = []
+        shared = "bodies", "friction_coefficient", "sliding_ratio", "stribeck_speed"
+        per_pad = "stiffness", "damping", "stick_stiffness", "preload"
         for ring, (radius, share) in enumerate(_gauss_on_ring(self.inner_radius, self.radius)):
-            own: dict[str, Any] = {name: getattr(self, name) for name in (*same, *of_each)}
-            own |= {n: 0.25 * share * own[n] for n in of_each if own[n] != "auto"}
-            pad = SideBearer(kind="side_bearer", point=NOTHING, **own)
+            values: dict[str, Any] = {name: getattr(self, name) for name in (*shared, *per_pad)}
+            values |= {n: 0.25 * share * values[n] for n in per_pad if values[n] != "auto"}
+            pad = SideBearer(kind="side_bearer", point=NOTHING, **values)
             for quarter in range(4):
                 angle = 0.5 * pi * quarter + 0.25 * pi * ring
                 offset = (radius * cos(angle), radius * sin(angle), 0.0)
-                found.append((f"pad_{4 * ring + quarter + 1}", offset, pad))
-        return found
+                pads.append((f"pad_{4 * ring + quarter + 1}", offset, pad))
+        return pads
 
     def rows(self) -> list[Mount]:
         """None of its own: its pads stand in the arrays."""

@@ -93,7 +93,7 @@ def rails_moved(channel: Channel) -> Floats:
     return np.array(SHARES[channel])[:, None] * (0.5 if channel == "cross_level" else 1.0)
 
 
-def faded(moved: Displacement, begin: float, end: float, fade: float) -> Displacement:
+def faded(displacement: Displacement, begin: float, end: float, fade: float) -> Displacement:
     """Return a displacement that rises behind `begin` and falls before `end` over `fade` [m]."""
     length = min(fade, 0.5 * (end - begin))
 
@@ -107,7 +107,7 @@ def faded(moved: Displacement, begin: float, end: float, fade: float) -> Displac
         return inside * 0.5 * (1.0 - np.cos(angle)), inside * rate
 
     def within(s: Floats) -> tuple[Floats, Floats]:
-        (value, rate), (share, slope) = moved(s), window(s)
+        (value, rate), (share, slope) = displacement(s), window(s)
         return share * value, share * rate + slope * value
 
     return within

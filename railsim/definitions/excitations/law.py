@@ -58,8 +58,8 @@ class ByLaw(base.Stretch):
         h, (begin, end) = self.shortest / PER_WAVE, self.extent(length)
         shares = self.factor * base.rails_moved(self.channel)
 
-        def moved(s: Floats) -> tuple[Floats, Floats]:
-            at = {k: function(np.clip(s + k * h, begin, end)) for k in (-2, -1, 0, 1, 2)}
-            return shares * at[0], shares * (8.0 * (at[1] - at[-1]) - at[2] + at[-2]) / (12.0 * h)
+        def value_and_rate(s: Floats) -> tuple[Floats, Floats]:
+            f = {k: function(np.clip(s + k * h, begin, end)) for k in (-2, -1, 0, 1, 2)}
+            return shares * f[0], shares * (8.0 * (f[1] - f[-1]) - f[2] + f[-2]) / (12.0 * h)
 
-        return base.faded(moved, begin, end, self.fade)
+        return base.faded(value_and_rate, begin, end, self.fade)

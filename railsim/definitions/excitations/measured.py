@@ -101,24 +101,24 @@ class Measured(base.Irregular):
         every second row, every fourth and so on say the same to `ALIKE`.
         """
         s = np.array(self._read())[:, 0]
-        least, of_a_tenth = float(np.diff(s).min()), float(np.quantile(np.diff(s), 0.1))
-        usual = max(FEW, 0.5 * least)
-        fine, every = max(FINEST, 0.5 * of_a_tenth), 2
-        while fine < usual and self._said_by(every):
+        least, tenth = float(np.diff(s).min()), float(np.quantile(np.diff(s), 0.1))
+        plain = max(FEW, 0.5 * least)
+        fine, every = max(FINEST, 0.5 * tenth), 2
+        while fine < plain and self._resolved_by(every):
             fine, every = 2.0 * fine, 2 * every
-        return min(usual, fine)
+        return min(plain, fine)
 
-    def _said_by(self, every: int) -> bool:
+    def _resolved_by(self, every: int) -> bool:
         """Whether a spline through some of the rows leaves the others by less than `ALIKE`."""
         from scipy.interpolate import CubicSpline  # a quarter of a second; most need none
 
         rows = np.array(self._read())
-        some = rows[::every]
-        if len(some) < 4:
+        thinned = rows[::every]
+        if len(thinned) < 4:
             return False
-        inside = rows[rows[:, 0] <= some[-1, 0]]
-        apart = CubicSpline(some[:, 0], some[:, 1:])(inside[:, 0]) - inside[:, 1:]
-        return bool(np.abs(self.scale * apart).max() < ALIKE)
+        inside = rows[rows[:, 0] <= thinned[-1, 0]]
+        error = CubicSpline(thinned[:, 0], thinned[:, 1:])(inside[:, 0]) - inside[:, 1:]
+        return bool(np.abs(self.scale * error).max() < ALIKE)
 
     def summary(self) -> str:
         """Return that it is measured, its number of rows and its scale."""
@@ -163,11 +163,11 @@ class Measured(base.Irregular):
         spline = CubicHermiteSpline(positions, values, slopes, axis=1)
         slope = spline.derivative()
 
-        def moved(s: Floats) -> tuple[Floats, Floats]:
-            at = np.clip(s, positions[0], positions[-1])
-            return spline(at), slope(at)
+        def value_and_rate(s: Floats) -> tuple[Floats, Floats]:
+            inside = np.clip(s, positions[0], positions[-1])
+            return spline(inside), slope(inside)
 
-        return base.faded(moved, positions[0], positions[-1], self.fade)
+        return base.faded(value_and_rate, positions[0], positions[-1], self.fade)
 
 
 def _between(positions: Floats, values: Floats, slopes: Floats) -> Floats:
@@ -190,13 +190,13 @@ def largest_between_rows(part: Measured) -> tuple[str, float, float, float]:
     any row says.
     """
     positions, values, slopes = part.interpolation()
-    found = np.abs(_between(positions, values, slopes)).reshape(4, -1)
+    between = np.abs(_between(positions, values, slopes)).reshape(4, -1)
     at_rows = np.abs(values).max(axis=1)
-    further = np.where(at_rows > 0.0, found.max(axis=1) - at_rows, -np.inf)
+    further = np.where(at_rows > 0.0, between.max(axis=1) - at_rows, -np.inf)
     column = int(np.argmax(further))
-    index = int(np.argmax(found[column]))
-    at = float(_inner(positions).ravel()[index])
-    return base.COLUMNS[column], float(at_rows[column]), float(found[column, index]), at
+    index = int(np.argmax(between[column]))
+    place = float(_inner(positions).ravel()[index])
+    return base.COLUMNS[column], float(at_rows[column]), float(between[column, index]), place
 
 
 def shape_preserving_slopes(positions: Floats, values: Floats) -> Floats:

@@ -48,7 +48,7 @@ def _embed(key: str, table: dict[str, Any]) -> None:
     how = _definition(table)
     if how is None:
         return  # refused by the definition
-    with changed_faults(lambda one: one if one.file else replace(one, key=f"{key}.{one.key}")):
+    with changed_faults(lambda f: f if f.file else replace(f, key=f"{key}.{f.key}")):
         rows, mileage = read_measured(path, how)
     for name in ("file", *READING):
         table.pop(name, None)
@@ -71,19 +71,19 @@ def recordings(tables: Iterable[Any]) -> list[tuple[str, Floats, Floats]]:
     `tables`: irregularities of a track as plain tables, with files. Returns: s, y_left, z_left,
     y_right, z_right [m]; `chord`, `band` and `scale` are in the second only.
     """
-    found = []
+    recordings = []
     for table in tables:
         how = _definition(table) if "file" in table else None
         if how is None:
             continue
         plain = how.model_copy(update={"chord": None, "band": None})
         path = Path(table["file"])
-        before, after = (read_measured(path, one)[0] for one in (plain, how))
+        before, after = (read_measured(path, definition)[0] for definition in (plain, how))
         before[:, 0] += how.shift
         after[:, 0] += how.shift
         after[:, 1:] *= how.scale
-        found.append((path.name, before, after))
-    return found
+        recordings.append((path.name, before, after))
+    return recordings
 
 
 def read_measured(path: Path, how: Measured) -> tuple[Floats, float | None]:
@@ -123,10 +123,10 @@ def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None
         raise input_error(path, "empty", "a header and rows of numbers")
     delimiter = next((d for d in (";", "\t") if d in numbered[0][1]), ",")
     head = [cell.strip() for cell in next(csv.reader([numbered[0][1]], delimiter=delimiter))]
-    columns = _mapped(path, head, how.columns) if how.columns else _header(path, head)
-    columns = [column and _as_told(column, how) for column in columns]
-    named = [column for column in columns if column]
-    _check_names(path, [column.name for column in named], how)
+    columns = _named_columns(path, head, how.columns) if how.columns else _header(path, head)
+    columns = [column and _calibrated(column, how) for column in columns]
+    used = [column for column in columns if column]
+    _check_names(path, [column.name for column in used], how)
     faults: list[tuple[int, str, str]] = []  # number of the line, found, allowed
     numbers, table = [], []
     for number, line in numbered[1:]:
@@ -138,9 +138,9 @@ def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None
             numbers.append(number)
         except ValueError as problem:
             faults.append((number, *problem.args))
-    values = np.array(table).reshape(len(table), len(named))
-    rows, mileage = _rows(named, values, how)
-    faults += [(numbers[k], what, allowed) for k, what, allowed in _row_faults(rows, named, values)]
+    values = np.array(table).reshape(len(table), len(used))
+    rows, mileage = _rows(used, values, how)
+    faults += [(numbers[k], what, allowed) for k, what, allowed in _row_faults(rows, used, values)]
     faults.sort(key=lambda fault: fault[0])
     Faults(counted(Fault(str(path), f"line {n}", *words) for n, *words in faults)).check()
     if len(rows) < 4:
@@ -153,10 +153,10 @@ def _check_names(path: Path, read: Sequence[str], how: Measured) -> None:
 
     Or where a unit, an offset or a sign is given of a column that is not read.
     """
-    told = {"units": how.units or (), "offset": how.offset or (), "reverse": how.reverse}
+    keys = {"units": how.units or (), "offset": how.offset or (), "reverse": how.reverse}
     faults = Faults(
         Fault("", key, f"'{name}' is no column that is read", nearest(name, read))
-        for key, names in told.items()
+        for key, names in keys.items()
         for name in names
         if name not in read
     )
@@ -241,7 +241,7 @@ def _filtered(path: Path, rows: Floats, how: Measured) -> Floats:
     return np.column_stack([rows[:, 0], values.T])
 
 
-def _as_told(column: Column, how: Measured) -> Column:
+def _calibrated(column: Column, how: Measured) -> Column:
     """Return a column with the unit, sign and offset that the definition gives it."""
     name, unit, _ = column
     if how.units and name in how.units:
@@ -249,22 +249,22 @@ def _as_told(column: Column, how: Measured) -> Column:
     return Column(name, -unit if name in how.reverse else unit, (how.offset or {}).get(name, 0.0))
 
 
-def _mapped(path: Path, head: list[str], named: dict[str, str]) -> list[Column | None]:
+def _named_columns(path: Path, head: list[str], names: dict[str, str]) -> list[Column | None]:
     """Columns that the definition names; None for the others."""
     columns: list[Column | None] = [None] * len(head)
     faults = Faults()
-    for name, theirs in named.items():
+    for name, label in names.items():
         if name not in SHARES:
             faults.append(Fault("", f"columns.{name}", "unknown quantity", nearest(name, SHARES)))
-        elif theirs not in head:
-            found = f"no column '{theirs}'"
-            faults.append(Fault(str(path), "header", found, nearest(theirs, head)))
-        elif columns[at := head.index(theirs)] is not None:
-            found = f"'{theirs}' is named twice"
+        elif label not in head:
+            found = f"no column '{label}'"
+            faults.append(Fault(str(path), "header", found, nearest(label, head)))
+        elif columns[index := head.index(label)] is not None:
+            found = f"'{label}' is named twice"
             faults.append(Fault("", f"columns.{name}", found, "once; y and z are of both rails"))
         else:
-            columns[at] = Column(name)
-    if "s" not in named:
+            columns[index] = Column(name)
+    if "s" not in names:
         faults.append(Fault("", "columns", "no column for s", "the arc length or mileage s"))
     faults.check()
     return columns
@@ -276,11 +276,11 @@ def _header(path: Path, cells: list[str]) -> list[Column | None]:
     faults = Faults()
     for cell in cells:
         read = [(cell.removesuffix(end), unit) for end, unit in UNITS.items() if cell.endswith(end)]
-        found = [Column(name, unit) for name, unit in read if name in SHARES]
-        if not found:
+        matches = [Column(name, unit) for name, unit in read if name in SHARES]
+        if not matches:
             allowed = nearest(cell, SHARES) + "; or name it in 'columns'"
             faults.append(Fault(str(path), "header", f"unknown column '{cell}'", allowed))
-        columns += found[:1]
+        columns += matches[:1]
     names = [column.name for column in columns if column]
     if "s" not in names:
         faults.append(Fault(str(path), "header", "no column s", "the arc length s in m"))

@@ -76,17 +76,17 @@ class Random(base.Stretch):
     def summary(self) -> str:
         """Return spectrum, channels, seed, band and scale."""
         low, high = self.wavelengths
-        of = f" of {' and '.join(self.channels)}" if self.channels else ""
+        chosen = f" of {' and '.join(self.channels)}" if self.channels else ""
         times = "" if self.scale == 1.0 else f", times {self.scale:g}"
         mirrored = ", mirrored" if self.mirror else ""
-        return f"{self.spectrum}{of}, seed {self.seed}, {low:g} to {high:g} m{times}{mirrored}"
+        return f"{self.spectrum}{chosen}, seed {self.seed}, {low:g} to {high:g} m{times}{mirrored}"
 
     def displacement(self, length: float) -> base.Displacement:
         """Return the sum of cosines of all channels, by interpolation on a periodic lattice."""
         from scipy.fft import next_fast_len
 
-        own = self.coefficients
-        spectrum = erri_b176(own) if own else SPECTRA[self.spectrum]
+        coefficients = self.coefficients
+        spectrum = erri_b176(coefficients) if coefficients else SPECTRA[self.spectrum]
         begin, end = self.extent(length)
         shortest, longest = self.wavelengths
         period = max(end - begin, PERIOD_IN_WAVES * longest)
@@ -104,10 +104,10 @@ class Random(base.Stretch):
             for k in np.flatnonzero(shares):
                 lattice[:, k] += shares[k] * waves
 
-        def moved(s: Floats) -> tuple[Floats, Floats]:
+        def value_and_rate(s: Floats) -> tuple[Floats, Floats]:
             return _periodic(lattice, period, s - begin)
 
-        return base.faded(moved, begin, end, self.fade)
+        return base.faded(value_and_rate, begin, end, self.fade)
 
 
 def _amplitudes(

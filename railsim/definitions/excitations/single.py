@@ -42,11 +42,11 @@ class Single(Irregular):
         shares = np.array(middle)[:, None]
         shape = self._cosine if self.shape == "cosine" else self._triangle
 
-        def moved(s: Floats) -> tuple[Floats, Floats]:
+        def value_and_rate(s: Floats) -> tuple[Floats, Floats]:
             value, rate = shape(s - self.s)
             return shares * value, shares * rate
 
-        return moved
+        return value_and_rate
 
     def _cosine(self, u: Floats) -> tuple[Floats, Floats]:
         wave = 2.0 * np.pi / self.length

@@ -59,11 +59,11 @@ class Sweep(base.Stretch):
         extent, octaves = self.end - self.begin, np.log(first / last)
         shares = self.amplitude * base.rails_moved(self.channel)
 
-        def moved(s: Floats) -> tuple[Floats, Floats]:
+        def value_and_rate(s: Floats) -> tuple[Floats, Floats]:
             u = np.clip((s - self.begin) / extent, 0.0, 1.0)
             waves = extent / first * u * exprel(octaves * u)
             rate = 2.0 * np.pi / first * np.exp(octaves * u)
             phase = 2.0 * np.pi * waves
             return shares * np.sin(phase), shares * rate * np.cos(phase)
 
-        return base.faded(moved, self.begin, self.end, self.fade)
+        return base.faded(value_and_rate, self.begin, self.end, self.fade)

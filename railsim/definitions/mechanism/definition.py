@@ -330,8 +330,8 @@ class Mechanism(FileDefinition):
         earlier = before.provenance.get("set", ()) if isinstance(before, Mechanism) else ()
         paths = [key.split(".") for key in keys]
         changed = [path[1] for path in paths if path[0] == "parameters" and len(path) == 2]
-        known = tables.get("parameters", {})
-        if changed := [name for name in dict.fromkeys([*earlier, *changed]) if name in known]:
+        parameters = tables.get("parameters", {})
+        if changed := [name for name in dict.fromkeys([*earlier, *changed]) if name in parameters]:
             tables["provenance"] = {**tables.get("provenance", {}), "set": changed}
 
     def contradictions(self) -> list[Fault]:

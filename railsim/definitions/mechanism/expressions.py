@@ -104,9 +104,9 @@ def _check(node: ast.expr) -> None:
         case ast.BinOp(op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() | ast.Pow()):
             allowed, parts = True, [node.left, node.right]
         case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]) if name in FUNCTIONS:
-            wanted = 2 if name in ("atan2", "hypot") else 1
-            if len(parts) != wanted:
-                raise ValueError(f"{name} takes {wanted} argument{'s' * (wanted - 1)}")
+            number = 2 if name in ("atan2", "hypot") else 1
+            if len(parts) != number:
+                raise ValueError(f"{name} takes {number} argument{'s' * (number - 1)}")
             allowed = True
         case _:
             allowed = False

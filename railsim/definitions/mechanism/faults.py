@@ -54,8 +54,8 @@ def mechanism_remarks(mechanism: Mechanism) -> Iterator[Remark]:
     for text in mechanism.remarks:
         yield Remark("remarks", text)
     stated = {name for names in mechanism.provenance.values() for name in names}
-    if silent := [name for name in mechanism.parameters if name not in stated]:
-        yield Remark("provenance", f"not stated for {', '.join(silent)}")
+    if unstated := [name for name in mechanism.parameters if name not in stated]:
+        yield Remark("provenance", f"not stated for {', '.join(unstated)}")
     yield from bounds_remarks(mechanism)
 
 
@@ -201,16 +201,16 @@ def _value_faults(mechanism: Mechanism, case: str | None) -> list[Fault]:
         try:
             number(expression, values, key)
         except InputError as error:
-            where = f" in case '{case}'" if case else ""
-            faults += [_fault(f.key, f.found + where, f.allowed) for f in error.faults]
+            suffix = f" in case '{case}'" if case else ""
+            faults += [_fault(f.key, f.found + suffix, f.allowed) for f in error.faults]
     return faults or [*_range_faults(chosen, values)]
 
 
 def _range_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[Fault]:
     """Values out of their ranges, and tables that do not rise."""
     yield from _least_faults(mechanism, values)
-    for at, row in members(CatalogueRow, mechanism):
-        yield from _row_faults(at, row, values)
+    for key, row in members(CatalogueRow, mechanism):
+        yield from _row_faults(key, row, values)
     for table in ("actuators", "elements"):
         for name, part in getattr(mechanism, table).items():
             key = f"{table}.{name}"
@@ -235,9 +235,9 @@ def _range_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[F
         low, work, high = (number(getattr(zone, k), values) for k in ("low", "work", "high"))
         if not low <= work <= high or low == high:
             yield _fault("zone", f"{low:g}, {work:g}, {high:g}", "low <= work <= high")
-    wanted = mechanism.optimise
-    if wanted is not None and wanted.min_transmission_angle is not None:
-        angle = number(wanted.min_transmission_angle, values)
+    optimise = mechanism.optimise
+    if optimise is not None and optimise.min_transmission_angle is not None:
+        angle = number(optimise.min_transmission_angle, values)
         if not 0.0 < angle < 0.5 * np.pi:
             allowed = "above 0 and below pi/2 rad: angles are folded to it"
             yield _fault("optimise.min_transmission_angle", f"{angle:g}", allowed)
@@ -255,7 +255,7 @@ def _range_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[F
 
 def _least_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[Fault]:
     """Values that are too small, at the parameter that says it where there is just one."""
-    for at, part in members(Definition, mechanism):
+    for table, part in members(Definition, mechanism):
         for field, least in least_values(type(part)).items():
             given = getattr(part, field)
             for quantity in given if isinstance(given, tuple) else (given,):
@@ -264,7 +264,7 @@ def _least_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[F
                 value = number(quantity, values)
                 if value > least.value or (value == least.value and not least.excluded):
                     continue
-                key, found = f"{at}.{field}", f"{value:g}"
+                key, found = f"{table}.{field}", f"{value:g}"
                 if isinstance(quantity, Expression):
                     if str(quantity) in quantity.names:
                         key, found = f"parameters.{quantity}", f"{value:g} (as {key})"
@@ -277,8 +277,8 @@ def _row_faults(key: str, row: CatalogueRow, values: Mapping[str, Any]) -> Itera
     """Ranges and lists of a series of gas springs that cannot be."""
     pair, some = "smallest and largest, greater than 0", "one or more, greater than 0"
     for field, allowed in {"stroke": pair, "strokes": some, "F1": pair}.items():
-        if (given := getattr(row, field)) is not None:
-            found = [number(q, values) for q in given]
+        if (quantities := getattr(row, field)) is not None:
+            found = [number(q, values) for q in quantities]
             if not found or min(found) <= 0.0 or (allowed is pair and found != sorted(found)):
                 yield _fault(f"{key}.{field}", ", ".join(map("{:g}".format, found)), allowed)
     for k, band in enumerate(row.F1_tolerance or ()):
@@ -304,8 +304,8 @@ def _unit_faults(mechanism: Mechanism) -> Iterator[Fault]:
     for name, value in mechanism.parameters.items():
         unit = mechanism.unit_of(name)
         if not isinstance(value, str) and unit in limits and abs(value) >= limits[unit][0]:
-            words = f"{value:g} {unit}, out of proportion"
-            yield _fault(f"parameters.{name}", words, limits[unit][1])
+            found = f"{value:g} {unit}, out of proportion"
+            yield _fault(f"parameters.{name}", found, limits[unit][1])
 
 
 def _freedom_faults(mechanism: Mechanism) -> Iterator[Fault]:
@@ -322,13 +322,13 @@ def _freedom_faults(mechanism: Mechanism) -> Iterator[Fault]:
 
 def _size_faults(mechanism: Mechanism) -> list[Fault]:
     values = parameter_values(mechanism)
-    found = sizes(mechanism, values)
-    if not found:
+    lengths = sizes(mechanism, values)
+    if not lengths:
         return [_fault("bodies", "no lengths", "points at different positions")]
-    middle = float(np.median(list(found.values())))
+    middle = float(np.median(list(lengths.values())))
     faults = [
         _fault(key, f"{size:g} m, the others about {middle:.3g} m", "lengths in metres")
-        for key, size in (found | part_sizes(mechanism, values)).items()
+        for key, size in (lengths | part_sizes(mechanism, values)).items()
         if size > LARGEST or size > OUT_OF_PROPORTION * middle
     ]
     # the parameters that a user wrote, where they are the cause

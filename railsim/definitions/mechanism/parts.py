@@ -60,15 +60,15 @@ Progression = Annotated[Quantity, Least(1.0, "1 or greater: the gas is compresse
 @cache
 def least_values(kind: type[Definition]) -> dict[str, Least]:
     """Smallest values of the quantities of a definition, by its fields."""
-    found = {}
+    least = {}
     for name, field in kind.model_fields.items():
         notes = list(field.metadata)
         for member in get_args(field.annotation):  # of an optional one
             notes += getattr(member, "__metadata__", ())
         for note in notes:
             if isinstance(note, Least):
-                found[name] = note
-    return found
+                least[name] = note
+    return least
 
 
 class Reference(str):
@@ -474,13 +474,13 @@ class _ByKey:
                     return f"a {key}"
             return None
 
-        told = Discriminator(
+        by_key = Discriminator(
             tag,
             custom_error_type="one_of",
             custom_error_message=f"one of the keys {', '.join(kinds)} must say what it is",
         )
         tagged = (Annotated[kind, Tag(f"a {key}")] for key, kind in kinds.items())
-        return handler.generate_schema(Annotated[Union[tuple(tagged)], told])  # noqa: UP007
+        return handler.generate_schema(Annotated[Union[tuple(tagged)], by_key])  # noqa: UP007
 
 
 Joint = Annotated[Revolute | Link | Slot | Prismatic | Cam, _ByKey]

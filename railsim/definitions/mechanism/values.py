@@ -78,12 +78,12 @@ def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> A
         raise input_error("", str(error), hint, key=key) from None
 
 
-def coordinates(where: Any, values: Mapping[str, Any]) -> tuple[Any, Any]:
+def coordinates(point: Any, values: Mapping[str, Any]) -> tuple[Any, Any]:
     """Coordinates of a point in its body's axes."""
-    if isinstance(where, Polar):
-        radius, angle = number(where.radius, values), number(where.angle, values)
+    if isinstance(point, Polar):
+        radius, angle = number(point.radius, values), number(point.angle, values)
         return radius * np.cos(angle), radius * np.sin(angle)
-    return number(where[0], values), number(where[1], values)
+    return number(point[0], values), number(point[1], values)
 
 
 def point_names(mechanism: Mechanism) -> list[str]:
@@ -112,32 +112,32 @@ def body_name(point: str) -> str:
 
 def sizes(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, float]:
     """Lengths of the mechanism by the key that says them [m]; arcs of cams are left out."""
-    found = {}
+    lengths = {}
     parts: list[tuple[str, Any]] = [("ground", mechanism.ground)]
     parts += [(f"bodies.{name}", body) for name, body in mechanism.bodies.items()]
     for key, part in parts:
-        for name, where in part.points.items():
-            x, y = coordinates(where, values)
-            found[f"{key}.points.{name}"] = float(np.hypot(x, y))
+        for name, point in part.points.items():
+            x, y = coordinates(point, values)
+            lengths[f"{key}.points.{name}"] = float(np.hypot(x, y))
     for name, joint in mechanism.joints.items():
         if isinstance(joint, Link):
-            found[f"joints.{name}.length"] = float(number(joint.length, values))
+            lengths[f"joints.{name}.length"] = float(number(joint.length, values))
         if isinstance(joint, Slot | Prismatic):
-            found[f"joints.{name}.offset"] = abs(float(number(joint.offset, values)))
-    return {key: size for key, size in found.items() if size > 1e-9}
+            lengths[f"joints.{name}.offset"] = abs(float(number(joint.offset, values)))
+    return {key: size for key, size in lengths.items() if size > 1e-9}
 
 
 def part_sizes(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, float]:
     """Lengths of actuators, elements and the zone by the key that says them [m]."""
-    found = {}
+    lengths = {}
     for table in ("actuators", "elements"):
         for name, part in getattr(mechanism, table).items():
             for field in PARTS:
                 if (quantity := getattr(part, field, None)) is not None:
-                    found[f"{table}.{name}.{field}"] = abs(float(number(quantity, values)))
+                    lengths[f"{table}.{name}.{field}"] = abs(float(number(quantity, values)))
             for i, height in enumerate(getattr(part, "heights", ())):
-                found[f"{table}.{name}.heights.{i}"] = abs(float(number(height, values)))
+                lengths[f"{table}.{name}.heights.{i}"] = abs(float(number(height, values)))
     if mechanism.zone is not None:
         for field in ("low", "work", "high"):
-            found[f"zone.{field}"] = abs(float(number(getattr(mechanism.zone, field), values)))
-    return found
+            lengths[f"zone.{field}"] = abs(float(number(getattr(mechanism.zone, field), values)))
+    return lengths

@@ -99,7 +99,7 @@ def unit_of_number(name: str) -> str:
 def needs_run(analyses: Mapping[str, Analysis]) -> bool:
     """Whether any of the analyses, or their absence, asks for a run in the time domain."""
     kinds = (RunAnalysis, AssessAnalysis)
-    return not analyses or any(isinstance(one, kinds) for one in analyses.values())
+    return not analyses or any(isinstance(analysis, kinds) for analysis in analyses.values())
 
 
 def needs_speed(analyses: Mapping[str, Analysis]) -> bool:

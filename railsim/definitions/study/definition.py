@@ -30,10 +30,10 @@ def value_texts(values: Values) -> list[str]:
     (['0.2', '0.3', '0.4'], ['true', '1', '2', '72 km/h', '[10, 20]'])
     """
     if isinstance(values, str):
-        found = range_values(values)
-        return [values] if found is None else [f"{value:.12g}" for value in found]
-    return [text for one in values
-            for text in (value_texts(one) if isinstance(one, str) else [_text(one)])]  # fmt: skip
+        numbers = range_values(values)
+        return [values] if numbers is None else [f"{value:.12g}" for value in numbers]
+    return [text for v in values
+            for text in (value_texts(v) if isinstance(v, str) else [_text(v)])]  # fmt: skip
 
 
 def _text(value: object) -> str:
@@ -156,13 +156,13 @@ class Study(FileDefinition):
                 raise ValueError("a table of linked keys is empty")
             lengths = {name: len(value_texts(values)) for name, values in table.items()}
             if len(set(lengths.values())) != 1:
-                told = ", ".join(f"'{name}' {length}" for name, length in lengths.items())
-                raise ValueError(f"linked keys need equally many values: {told}")
+                text = ", ".join(f"'{name}' {length}" for name, length in lengths.items())
+                raise ValueError(f"linked keys need equally many values: {text}")
         names = [*self.grid, *(name for table in self.linked for name in table)]
         names += list(self.sample.parameters) if self.sample else []
         names += self.optimise.keys if self.optimise else []
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"'{twice[0]}' is varied twice")
-        given = (self.speeds is not None) + ("speed" in names)
-        if given > 1 or (not given and needs_speed(self.analyses)):
+        sources = (self.speeds is not None) + ("speed" in names)
+        if sources > 1 or (not sources and needs_speed(self.analyses)):
             raise ValueError("'speeds' is needed, or 'speed' linked or sampled; not both")

@@ -93,7 +93,7 @@ class Optimise(base.Definition):
         """Objectives, then constraints, by their keys in the file."""
         tables = {"objectives": self.objectives, "constraints": self.constraints}
         return {
-            f"optimise.{t}.{k}": one for t, ones in tables.items() for k, one in enumerate(ones)
+            f"optimise.{t}.{k}": value for t, rows in tables.items() for k, value in enumerate(rows)
         }
 
     @base.check

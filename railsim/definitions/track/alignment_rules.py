@@ -52,7 +52,7 @@ def cant_at(cant: Sequence[Section], s: float) -> float:
 
 def corners(element: Section, cant: Sequence[Section]) -> list[float]:
     """Arc lengths of an element of the plan between which its cant is linear, from end to end."""
-    inside = [one.end for one in cant if element.begin < one.end < element.end]
+    inside = [section.end for section in cant if element.begin < section.end < element.end]
     return [element.begin, *inside, element.end]
 
 
@@ -68,14 +68,14 @@ def _curves(plan: Sequence[Section], cant: Sequence[Section], speed: float) -> I
         side = 1e3 * math.copysign(1.0, kappa)
         outwards = [side * cant_deficiency(speed, kappa, h) for h in heights]
         lack, excess = max(outwards), -min(outwards)
-        for found, limit, words, rule in (
+        for value, limit, text, rule in (
             (d, most, f"a cant of {d:.0f} mm", ""),
             (d, small, f"a cant of {d:.0f} mm", "(R - 100 m)/2 = "),
             (lack, MOST_DEFICIENCY, f"a cant deficiency of {lack:.0f} mm {at}", ""),
             (excess, MOST_EXCESS, f"a cant excess of {excess:.0f} mm {at}", ""),
         ):
-            if found > limit * ROUND_OFF:
-                yield Remark(section.key, f"{words} is more than {rule}{limit:.0f} mm")
+            if value > limit * ROUND_OFF:
+                yield Remark(section.key, f"{text} is more than {rule}{limit:.0f} mm")
 
 
 def _ramps(cant: Sequence[Section], speed: float) -> Iterator[Remark]:
@@ -91,7 +91,7 @@ def _ramps(cant: Sequence[Section], speed: float) -> Iterator[Remark]:
 def _transitions(
     plan: Sequence[Section], cant: Sequence[Section], speed: float
 ) -> Iterator[Remark]:
-    for section in (one for one in plan if one.type == "CLO"):
+    for section in (part for part in plan if part.type == "CLO"):
         _, lack = _changes(section, cant, speed)
         change = lack / section.length * speed
         if change > CHANGE * ROUND_OFF:
@@ -99,7 +99,7 @@ def _transitions(
             text = f"the cant deficiency changes by {change:.0f} mm/s, more than {CHANGE:g}{beyond}"
             yield Remark(section.key, text)
     V = 3.6 * speed
-    for section in (one for one in joined(plan) if one.type == "CLO"):
+    for section in (part for part in joined(plan) if part.type == "CLO"):
         d, lack = _changes(section, cant, speed)
         needed = max(d * V / 180.0, lack * V / 270.0, SHORTEST)
         if section.length * ROUND_OFF < needed:
@@ -117,7 +117,7 @@ def _changes(section: Section, cant: Sequence[Section], speed: float) -> tuple[f
 
 def _vertical_curves(vertical: Sequence[Section], speed: float) -> Iterator[Remark]:
     V = 3.6 * speed
-    for section in (one for one in vertical if one.slope):
+    for section in (part for part in vertical if part.slope):
         radius, needed = 1.0 / abs(section.slope), VERTICAL * V**2
         if radius * ROUND_OFF < needed:
             rule = f"0.35 V2 = {needed:.0f} m at {V:.0f} km/h"

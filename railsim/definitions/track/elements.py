@@ -149,12 +149,12 @@ def joined(sections: Sequence[Section]) -> list[Section]:
 
     So one writes curvature or cant that is no straight line, such as a half-wave.
     """
-    whole: list[Section] = []
-    for one in sections:
-        before = whole[-1] if whole else one
-        goes_on = before.slope * one.slope > 0.0 and abs(one.start_value) > 1e-9
-        if whole and goes_on and math.isclose(before.end_value, one.start_value, rel_tol=1e-6):
-            whole[-1] = replace(before, end=one.end, end_value=one.end_value)
+    merged: list[Section] = []
+    for section in sections:
+        before = merged[-1] if merged else section
+        goes_on = before.slope * section.slope > 0.0 and abs(section.start_value) > 1e-9
+        if merged and goes_on and math.isclose(before.end_value, section.start_value, rel_tol=1e-6):
+            merged[-1] = replace(before, end=section.end, end_value=section.end_value)
         else:
-            whole.append(one)
-    return whole
+            merged.append(section)
+    return merged

@@ -90,8 +90,8 @@ def track_faults(track: "Track") -> list[Fault]:
             found = f"the cant steps from {before.end_value:g} to {behind.start_value:g} m"
             faults.append(Fault("", behind.key, found, "a ramp (LIR) between the two elements"))
     for k, part in enumerate(track.sections):
-        for i, one in enumerate(track.sections[:k]):
-            if part.rail == one.rail and part.begin < one.end and one.begin < part.end:
+        for i, other in enumerate(track.sections[:k]):
+            if part.rail == other.rail and part.begin < other.end and other.begin < part.end:
                 found = f"{part.begin:g} to {part.end:g} m, within the range of sections.{i}"
                 faults.append(Fault("", f"sections.{k}", found, "ranges of a rail side by side"))
     return faults
@@ -101,7 +101,7 @@ def track_remarks(track: "Track") -> Iterator[Remark]:
     """Yield what is allowed in a track but unusual."""
     plan, cant, vertical = curvature_sections(track), cant_sections(track), gradient_sections(track)
     for before, behind in _steps(plan):
-        radii = [_written("radius", kappa) for kappa in (before.end_value, behind.start_value)]
+        radii = [_value_text("radius", kappa) for kappa in (before.end_value, behind.start_value)]
         text = f"the radius steps from {radii[0]} to {radii[1]} without a transition (CLO)"
         yield Remark(behind.key, text)
     for _, behind in _steps(vertical):
@@ -141,8 +141,8 @@ def track_remarks(track: "Track") -> Iterator[Remark]:
             text = f"{span}, beyond the track's {track.length:g} m"
             if shift is not None:
                 to = shift - begin if track.falling_mileage else -track.mileage or shift - begin
-                at = begin - shift + to
-                text += f"; is it a mileage? shift = {to:.9g} puts its begin at s = {at:g}"
+                place = begin - shift + to
+                text += f"; is it a mileage? shift = {to:.9g} puts its begin at s = {place:g}"
             yield Remark(key, text)
         elif key.startswith("sections.") and (begin < 0.0 or end > track.length):
             text = f"from {begin:g} to {end:g} m, partly beyond the track's {track.length:g} m"
@@ -171,10 +171,10 @@ def _supports(support: Support) -> Iterator[Remark]:
 def _check_rails_at_once(track: "Track") -> Iterator[Remark]:
     """Remark on check rails beside the same rail at the same place."""
     for k, part in enumerate(track.check_rail):
-        for i, one in enumerate(track.check_rail[:k]):
-            begin = max(part.rows[0][0], one.rows[0][0])
-            end = min(part.rows[-1][0], one.rows[-1][0])
-            if part.rail == one.rail and begin < end:
+        for i, other in enumerate(track.check_rail[:k]):
+            begin = max(part.rows[0][0], other.rows[0][0])
+            end = min(part.rows[-1][0], other.rows[-1][0])
+            if part.rail == other.rail and begin < end:
                 text = f"from {begin:g} to {end:g} m beside check_rail.{i}: their forces add up"
                 yield Remark(f"check_rail.{k}", text)
 
@@ -192,15 +192,15 @@ def _slopes(track: "Track") -> Iterator[Remark]:
 
 def _not_reached(sections: Sequence[Section], rounding: float) -> Iterator[Remark]:
     """Remark on constant values between two larger or smaller ones that the rounding averages."""
-    for before, one, after in zip(sections, sections[1:], sections[2:], strict=False):
+    for before, part, after in zip(sections, sections[1:], sections[2:], strict=False):
         # what it steps from, or where the ramp to it begins, and so behind it
-        at = one.start_value
-        first = before.start_value if before.end_value == at else before.end_value
-        last = after.end_value if after.start_value == at else after.start_value
-        alone = one.slope == 0.0 and (at - first) * (at - last) > 0.0
-        if alone and one.length < rounding - SMALL:
-            text = f"{one.length:g} m are shorter than the rounding ({rounding:g} m), over which"
-            yield Remark(one.key, f"{text} it is averaged: its full value is not reached")
+        value = part.start_value
+        first = before.start_value if before.end_value == value else before.end_value
+        last = after.end_value if after.start_value == value else after.start_value
+        alone = part.slope == 0.0 and (value - first) * (value - last) > 0.0
+        if alone and part.length < rounding - SMALL:
+            text = f"{part.length:g} m are shorter than the rounding ({rounding:g} m), over which"
+            yield Remark(part.key, f"{text} it is averaged: its full value is not reached")
 
 
 def _mileages(track: "Track") -> Iterator[Remark]:
@@ -213,13 +213,13 @@ def _mileages(track: "Track") -> Iterator[Remark]:
         alike, s = (own is None) != track.falling_mileage, begin - part.shift
         if own is None and alike and part.shift and s >= 0.5 * track.mileage:
             own = s if abs(s - track.mileage) <= track.length else None  # the file's s is a mileage
-        there = float(track.mileage_at(begin))
-        if own is None or (alike and abs(there - own) < SAME_MILEAGE):
+        of_track = float(track.mileage_at(begin))
+        if own is None or (alike and abs(of_track - own) < SAME_MILEAGE):
             continue
-        shift = part.shift + (there - own if track.falling_mileage else own - there)
+        shift = part.shift + (of_track - own if track.falling_mileage else own - of_track)
         agree = f"shift = {shift:.9g} makes them agree"
         text = f"begins at km {1e-3 * own:.4f}, which is put at s = {begin:g} m, km "
-        text += f"{1e-3 * there:.4f} of the track; "
+        text += f"{1e-3 * of_track:.4f} of the track; "
         turned = "the file's mileage falls, that of the track rises"
         yield Remark(f"irregularities.{k}", text + (agree if alike else turned))
 
@@ -265,17 +265,17 @@ _END_KEYS = {"plan": "radius", "cant": "cant", "vertical": "gradient"}
 
 
 def _end_faults(
-    key: str, kind: str, end: str, own: float | None, other: float | None
+    key: str, kind: str, end: str, value: float | None, other: float | None
 ) -> Iterator[Fault]:
     """Faults of one end of a ramp with its value and that of the neighbour there."""
     word = _END_KEYS[key.split(".")[0]]
     neighbour = "before" if end == "start" else "behind"
-    if own is None and other is None:
+    if value is None and other is None:
         allowed = f"'{word}_{end}' here, as no element {neighbour} gives it"
         yield Fault("", key, f"the {end} of the {kind} is open", allowed)
-    if own is not None and other is not None and not _same(own, other):
+    if value is not None and other is not None and not _same(value, other):
         found = f"its {word} does not match the element {neighbour}"
-        text = f"{_written(word, own)}, the element {neighbour} has {_written(word, other)}"
+        text = f"{_value_text(word, value)}, the element {neighbour} has {_value_text(word, other)}"
         yield Fault("", f"{key}.{word}_{end}", text, found)
 
 
@@ -283,7 +283,7 @@ def _same(a: float, b: float) -> bool:
     return abs(a - b) <= 1e-9 + 1e-6 * max(abs(a), abs(b))
 
 
-def _written(word: str, value: float) -> str:
+def _value_text(word: str, value: float) -> str:
     if word != "radius":
         return f"{value:g}"
     return "inf" if value == 0.0 else f"{1.0 / value:g} m"

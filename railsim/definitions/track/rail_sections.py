@@ -110,14 +110,14 @@ class RailSections(Definition):
 
     def _gap(self) -> tuple[float, float]:
         """Ends of the longest part of the range without a section, along the track [m]."""
-        inside = [one.s + self.shift for one in self.contours or ()]
+        inside = [contour.s + self.shift for contour in self.contours or ()]
         ends = sorted({self.begin, self.end, *(s for s in inside if self.begin < s < self.end)})
         return max(pairwise(ends), key=lambda pair: pair[1] - pair[0])
 
     def unusual(self) -> str:
         """Say where sections are far apart for their number; nothing where they are not."""
         a, b = self._gap()
-        places = [one.s + self.shift for one in self.contours or ()]
+        places = [contour.s + self.shift for contour in self.contours or ()]
         inside = sum(self.begin <= s <= self.end for s in places)
         if b - a < FAR_APART * (self.end - self.begin) / (inside + 1):
             return ""
@@ -135,21 +135,21 @@ def embed_rail_sections(data: dict[str, Any]) -> list[Fault]:
 
 
 def _embed(_: str, table: dict[str, Any]) -> None:
-    found = read_sections(table["file"], "rail")
+    sections = read_sections(table["file"], "rail")
     del table["file"]
     if turn := table.get("trailing") is True:
         del table["trailing"]
-    positions = (-found.positions[::-1] if turn else found.positions).tolist()
-    pairs = list(zip(positions, found.points[:: -1 if turn else 1], strict=True))
+    positions = (-sections.positions[::-1] if turn else sections.positions).tolist()
+    pairs = list(zip(positions, sections.points[:: -1 if turn else 1], strict=True))
     begin, end, shift = (table.get(key, 0.0) for key in ("begin", "end", "shift"))
     if all(isinstance(value, int | float) for value in (begin, end, shift)):
-        inside = [k for k, at in enumerate(positions) if begin <= at + shift <= end]
+        inside = [k for k, place in enumerate(positions) if begin <= place + shift <= end]
         # those in the range, and two beside it at either end
         pairs = pairs[max(0, inside[0] - 2) : inside[-1] + 3] if inside else pairs
     table["contours"] = [
-        {"s": round(s, 6), "y": _written(y), "z": _written(z)} for s, (y, z) in pairs
+        {"s": round(s, 6), "y": _rounded(y), "z": _rounded(z)} for s, (y, z) in pairs
     ]
 
 
-def _written(values: Any) -> list[float]:
+def _rounded(values: Any) -> list[float]:
     return [round(value, 7) for value in values.tolist()]

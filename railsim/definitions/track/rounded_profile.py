@@ -45,11 +45,11 @@ class RoundedProfile:
         self._half_window = 0.5 * rounding
         self._is_zero = not sections
 
-    def _plain(self, times: int, at: Floats) -> Floats:
+    def _plain(self, times: int, s: Floats) -> Floats:
         """Derivatives (-2, -1), value (0) or integrals (1, 2) before rounding."""
         # scipy's PPoly does this too, but its package takes a quarter of a second to import
-        piece = np.clip(np.searchsorted(self._knots, at, side="right") - 1, 0, None)
-        u = at - self._knots[piece]
+        piece = np.clip(np.searchsorted(self._knots, s, side="right") - 1, 0, None)
+        u = s - self._knots[piece]
         highest, *others = self._pieces[times + 2]
         total: Floats = highest[piece]
         for coefficient in others:
@@ -58,12 +58,12 @@ class RoundedProfile:
 
     def _rounded(self, times: int, s: ArrayLike) -> Floats:
         """As `_plain`, the mean over the window."""
-        at, h = np.asarray(s, dtype=np.float64), self._half_window
+        x, h = np.asarray(s, dtype=np.float64), self._half_window
         if self._is_zero:
-            return np.zeros_like(at)
+            return np.zeros_like(x)
         if h == 0.0:
-            return self._plain(times, at)
-        mean: Floats = (self._plain(times + 1, at + h) - self._plain(times + 1, at - h)) / (2.0 * h)
+            return self._plain(times, x)
+        mean: Floats = (self._plain(times + 1, x + h) - self._plain(times + 1, x - h)) / (2.0 * h)
         return mean
 
     def __call__(self, s: ArrayLike) -> Floats:

@@ -145,8 +145,8 @@ class Support(Definition):
         """What carries the rails, for tables."""
         if self.preset == "rigid":
             return "rigid"
-        own = self.model_dump(exclude={"preset"}, exclude_none=True)
-        return f"elastic, {self.preset}{' with own values' if own else ''}"
+        values = self.model_dump(exclude={"preset"}, exclude_none=True)
+        return f"elastic, {self.preset}{' with own values' if values else ''}"
 
     @property
     def values(self) -> SupportValues | None:
@@ -154,5 +154,5 @@ class Support(Definition):
         base = PRESETS[self.preset]
         if base is None:
             return None
-        own = {name: getattr(self, name) for name in SupportValues.__dataclass_fields__}
-        return replace(base, **{name: value for name, value in own.items() if value is not None})
+        given = {name: getattr(self, name) for name in SupportValues.__dataclass_fields__}
+        return replace(base, **{name: value for name, value in given.items() if value is not None})

@@ -18,12 +18,12 @@ def frame_above(flat: FlatVehicle, wheelset: FlatBody) -> FlatBody | None:
     """
     between = _between(flat, wheelset.name)
     others = [body for body in flat.of_kind("body") if body.name != flat.reference]
-    found = [body for body in others if body.name in between] or others
+    candidates = [body for body in others if body.name in between] or others
 
     def distance(body: FlatBody) -> float:
         return abs(body.position[0] - wheelset.position[0])
 
-    nearest = min(found, key=distance, default=None)
+    nearest = min(candidates, key=distance, default=None)
     return nearest if nearest is not None and distance(nearest) <= NEAR else None
 
 
@@ -50,8 +50,8 @@ def bogie_mass(flat: FlatVehicle, wheelset: FlatBody) -> float:
         if body is frame
         or (assembly and body.name.startswith(f"{assembly}.") and body.name != flat.reference)
     ]
-    own = [w for w in flat.of_kind("wheelset") if frame_above(flat, w) is frame]
-    return sum(body.mass for body in (*inside, *own))
+    wheelsets = [w for w in flat.of_kind("wheelset") if frame_above(flat, w) is frame]
+    return sum(body.mass for body in (*inside, *wheelsets))
 
 
 def carrying(flat: FlatVehicle) -> tuple[FlatBody, ...]:
@@ -62,34 +62,34 @@ def carrying(flat: FlatVehicle) -> tuple[FlatBody, ...]:
     """
     heavy = 0.5 * flat.body(flat.reference).mass
     wheelsets = flat.of_kind("wheelset")
-    found = []
+    carriers = []
     for wheelset in wheelsets:
         between = _between(flat, wheelset.name)
         cars = [name for name in between if flat.body(name).mass >= heavy and name != wheelset.name]
         if cars == [flat.reference]:
-            found.append(wheelset)
-    return tuple(found) or wheelsets
+            carriers.append(wheelset)
+    return tuple(carriers) or wheelsets
 
 
 def _between(flat: FlatVehicle, wheelset: str) -> Set[str]:
     """Names of the bodies on the shortest ways from a wheelset to the reference body."""
-    joined: dict[str, set[str]] = defaultdict(set)
+    neighbours: dict[str, set[str]] = defaultdict(set)
     holding = [e for e in flat.elements if e.body2 and not is_about_axle(e.definition)]
     ends = [(e.body1, e.body2) for e in holding]
     ends += [(body.name, body.parent) for body in flat.bodies if body.parent]
-    for one, other in ends:
-        joined[one].add(other)
-        joined[other].add(one)
-    there, back = _steps(joined, wheelset), _steps(joined, flat.reference)
-    if flat.reference not in there:
+    for first, second in ends:
+        neighbours[first].add(second)
+        neighbours[second].add(first)
+    outward, back = _steps(neighbours, wheelset), _steps(neighbours, flat.reference)
+    if flat.reference not in outward:
         return set()
-    return {name for name in there if there[name] + back[name] == there[flat.reference]}
+    return {name for name in outward if outward[name] + back[name] == outward[flat.reference]}
 
 
-def _steps(joined: Mapping[str, Set[str]], begin: str) -> dict[str, int]:
+def _steps(neighbours: Mapping[str, Set[str]], begin: str) -> dict[str, int]:
     """Least number of elements from a body to every other one that can be reached."""
-    found, edge = {begin: 0}, {begin}
+    steps, edge = {begin: 0}, {begin}
     while edge:
-        edge = {name for one in edge for name in joined.get(one, ())} - found.keys()
-        found |= dict.fromkeys(edge, max(found.values()) + 1)
-    return found
+        edge = {name for body in edge for name in neighbours.get(body, ())} - steps.keys()
+        steps |= dict.fromkeys(edge, max(steps.values()) + 1)
+    return steps

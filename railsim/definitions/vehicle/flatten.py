@@ -11,10 +11,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from railsim.constants import GRAVITY
-from railsim.definitions.base import Vector, kept
+from railsim.definitions.base import Vector, once
 from railsim.definitions.elements.base import Element
 from railsim.definitions.elements.traction import is_about_axle
-from railsim.definitions.vehicle.loads import load_faults, loaded
+from railsim.definitions.vehicle.loads import in_load_case, load_faults
 from railsim.definitions.vehicle.names import name_faults, resolve, sided_names
 from railsim.definitions.vehicle.tables import Assembly, Placement, Wheelset
 from railsim.errors import Fault, InputError
@@ -161,7 +161,7 @@ def flatten(vehicle: "Vehicle") -> FlatVehicle:
     """
     if getattr(vehicle, "KIND", "") != "vehicle":
         raise TypeError(wrong_type("vehicle", vehicle))
-    return kept(vehicle, "_flattened", lambda: _checked_and_flat(vehicle))
+    return once(vehicle, "_flattened", lambda: _checked_and_flat(vehicle))
 
 
 def _checked_and_flat(vehicle: "Vehicle") -> FlatVehicle:
@@ -174,7 +174,7 @@ def _checked_and_flat(vehicle: "Vehicle") -> FlatVehicle:
 
 
 def _flat(vehicle: "Vehicle") -> FlatVehicle:
-    vehicle = loaded(vehicle)
+    vehicle = in_load_case(vehicle)
     frames = list(_frames(vehicle, _Frame()))
     bodies = [body for group, frame in frames for body in _bodies(group, frame)]
     wheelsets = [body for group, frame in frames for body in _wheelsets(group, frame)]
@@ -192,15 +192,15 @@ def _flat(vehicle: "Vehicle") -> FlatVehicle:
 
 def _bodies(group: Group, frame: _Frame) -> Iterator[FlatBody]:
     for name, body in group.bodies.items():
-        at = frame.point(body.position)
-        yield FlatBody(frame.full(name), "body", body.mass, body.inertia, at, fixed=body.fixed)
+        place = frame.point(body.position)
+        yield FlatBody(frame.full(name), "body", body.mass, body.inertia, place, fixed=body.fixed)
 
 
 def _wheelsets(group: Group, frame: _Frame) -> Iterator[FlatBody]:
     for name, wheelset in group.wheelsets.items():
-        about = wheelset.mass, wheelset.inertia, frame.point(wheelset.position), wheelset
+        values = wheelset.mass, wheelset.inertia, frame.point(wheelset.position), wheelset
         key = frame.key("wheelsets", name)
-        yield FlatBody(frame.full(name), "wheelset", *about, key=key)
+        yield FlatBody(frame.full(name), "wheelset", *values, key=key)
 
 
 def _axleboxes(group: Group, frame: _Frame, wheelsets: Mapping[str, int]) -> Iterator[FlatBody]:
@@ -225,27 +225,27 @@ def _elements(group: Group, frame: _Frame, positions: dict[str, Vector]) -> Iter
             ends = [resolve(body, frame.scope, side, positions) or "" for body in element.bodies]
             points = element.end_points()
             if points is None:
-                at = (positions[ends[0]], positions[ends[-1]])
+                points = (positions[ends[0]], positions[ends[-1]])
             else:
-                at = (frame.point(points[0], side), frame.point(points[1], side))
-            definition = element.mirrored(frame.signs(side)).with_known_preload(*at)
+                points = (frame.point(points[0], side), frame.point(points[1], side))
+            definition = element.mirrored(frame.signs(side)).with_known_preload(*points)
             body2 = ends[1] if len(ends) == 2 else ""
             full, parts = frame.full(sided), definition.parts()
             for suffix, offset, part in parts:
-                there = replace(frame, origin=at[0]).point(offset, side)
-                yield FlatElement(f"{full}.{suffix}", ends[0], body2, there, there, part)
+                place = replace(frame, origin=points[0]).point(offset, side)
+                yield FlatElement(f"{full}.{suffix}", ends[0], body2, place, place, part)
             if not parts:
-                yield FlatElement(full, ends[0], body2, at[0], at[1], definition)
+                yield FlatElement(full, ends[0], body2, points[0], points[1], definition)
 
 
 def position_faults(vehicle: "Vehicle") -> list[Fault]:
     """Return which parts of a vehicle stand where they cannot; the faults' file is left empty."""
     if wrong := load_faults(vehicle):
         return wrong
-    found: dict[str, Fault] = {}
+    faults: dict[str, Fault] = {}
     for fault in _position_faults(vehicle):  # a definition used several times is reported once
-        found.setdefault(fault.key, fault)
-    return list(found.values())
+        faults.setdefault(fault.key, fault)
+    return list(faults.values())
 
 
 def _position_faults(vehicle: "Vehicle") -> Iterator[Fault]:

@@ -108,8 +108,8 @@ class Signal(base.Definition):
     @property
     def unit(self) -> str:
         """SI unit of what is measured."""
-        about = ABOUT_AXES.get(self.quantity) if self.axis in ANGLES else None
-        return about or SIGNALS[self.quantity]
+        unit = ABOUT_AXES.get(self.quantity) if self.axis in ANGLES else None
+        return unit or SIGNALS[self.quantity]
 
     @base.check
     def _what_belongs_together(self) -> None:
@@ -131,9 +131,9 @@ class Signal(base.Definition):
             "axis": (*BODY_SIGNALS, *ELEMENT_SIGNALS),
             "ahead": ("curvature", "cant_angle"),
         }
-        for key, those in only.items():
-            if self.quantity not in those and getattr(self, key):
-                raise ValueError(f"'{key}' belongs to {', '.join(those)} and only to them")
+        for key, allowed in only.items():
+            if self.quantity not in allowed and getattr(self, key):
+                raise ValueError(f"'{key}' belongs to {', '.join(allowed)} and only to them")
         if self.rate is None and (self.delay > 0.0 or self.noise > 0.0):
             raise ValueError("'delay' and 'noise' need 'rate'")
         if self.rate is not None and self.delay * self.rate > 1e6:
@@ -178,8 +178,8 @@ def with_sources(tables: dict[str, Any]) -> list[Fault]:
             if name in library_files("law"):
                 laws[name] = {"file": name}
             else:
-                known = [*laws, *library_files("law")]
-                allowed = f"a table laws.{name}" + (f"; {nearest(name, known)}" if known else "")
+                names = [*laws, *library_files("law")]
+                allowed = f"a table laws.{name}" + (f"; {nearest(name, names)}" if names else "")
                 faults.append(Fault("", key, f"no law '{name}'", allowed))
     for name, law in laws.items() if isinstance(laws, dict) else ():
         if not isinstance(law, dict) or not isinstance(law.get("file"), str) or "source" in law:
@@ -203,10 +203,10 @@ def with_sources(tables: dict[str, Any]) -> list[Fault]:
     return faults
 
 
-def _used(node: Any, at: str = "") -> Iterator[tuple[str, str]]:
+def _used(node: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
     """Yield key and name of every law that is used in plain tables."""
     for key, value in node.items() if isinstance(node, dict) else enumerate(node):
         if key == "law" and isinstance(value, str):
-            yield f"{at}law", value
-        elif isinstance(value, dict | list) and f"{at}{key}" != "laws":
-            yield from _used(value, f"{at}{key}.")
+            yield f"{prefix}law", value
+        elif isinstance(value, dict | list) and f"{prefix}{key}" != "laws":
+            yield from _used(value, f"{prefix}{key}.")

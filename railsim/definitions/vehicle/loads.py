@@ -52,12 +52,12 @@ class LoadCase(LoadGroup):
     """What it stands for"""
 
 
-def loaded(vehicle: V) -> V:
+def in_load_case(vehicle: V) -> V:
     """Return the vehicle with the bodies of the load case in force."""
-    given: Any = vehicle
-    if given.load is None:
+    group: Any = vehicle
+    if group.load is None:
         return vehicle
-    return vehicle.model_copy(update=_changes(given, given.loads[given.load]))
+    return vehicle.model_copy(update=_changes(group, group.loads[group.load]))
 
 
 def _changes(group: Any, load: LoadGroup) -> dict[str, object]:
@@ -87,11 +87,11 @@ def load_faults(vehicle: Any) -> list[Fault]:
 
 def _unknown(group: Any, load: LoadGroup, key: str) -> Iterator[Fault]:
     for table, word in (("bodies", "body"), ("assemblies", "assembly")):
-        known = list(getattr(group, table))
+        names = list(getattr(group, table))
         for name in getattr(load, table):
-            if name not in known:
+            if name not in names:
                 found = f"no {word} '{name}' in this part of the vehicle"
-                yield Fault("", f"{key}.{table}.{name}", found, nearest(name, known))
+                yield Fault("", f"{key}.{table}.{name}", found, nearest(name, names))
     for name, inner in load.assemblies.items():
         if name in group.assemblies:
             yield from _unknown(group.assemblies[name], inner, f"{key}.assemblies.{name}")

@@ -41,11 +41,11 @@ class Group:
         return ".".join((*self.scope, *names))
 
     def unknown(
-        self, name: Any, side: str | None, known: Mapping[str, Any], key: str, kind: str
+        self, name: Any, side: str | None, bodies: Mapping[str, Any], key: str, kind: str
     ) -> Iterator[Wrong]:
         """Yield what is wrong if a name means none of the known bodies here."""
-        if isinstance(name, str) and resolve(name, self.scope, side, known) is None:
-            yield key, f"no {kind} '{name}'", lambda: nearest(name, visible(self.scope, known))
+        if isinstance(name, str) and resolve(name, self.scope, side, bodies) is None:
+            yield key, f"no {kind} '{name}'", lambda: nearest(name, visible(self.scope, bodies))
 
 
 def _members(parts: Mapping[str, Any], key: str) -> dict[str, Mapping[str, Any]]:
@@ -105,8 +105,8 @@ def placement_names(assembly: Mapping[str, Any]) -> list[str]:
     placements = assembly.get("placements")
     if not isinstance(placements, list | tuple):
         return []
-    named = [p["name"] for p in placements if isinstance(p, Mapping) and "name" in p]
-    return [name for name in named if isinstance(name, str)]
+    names = [p["name"] for p in placements if isinstance(p, Mapping) and "name" in p]
+    return [name for name in names if isinstance(name, str)]
 
 
 def sided_names(name: str, sides: object) -> list[tuple[str, str | None]]:
@@ -133,28 +133,28 @@ def body_names(parts: Mapping[str, Any]) -> tuple[dict[str, str], list[Fault]]:
     return kinds, faults
 
 
-def resolve(name: str, scope: Scope, side: str | None, known: Mapping[str, Any]) -> str | None:
+def resolve(name: str, scope: Scope, side: str | None, bodies: Mapping[str, Any]) -> str | None:
     """Return the full name of the body that `name` means in an assembly, or None.
 
     `name`: name as written, perhaps dotted; `scope`: where it is written; `side`: side of the
-    element that names it: an axlebox on both sides is then the one on that side; `known`: full
+    element that names it: an axlebox on both sides is then the one on that side; `bodies`: full
     names of all bodies.
     """
     for depth in range(len(scope), -1, -1):
         full = ".".join((*scope[:depth], name))
-        if full in known:
+        if full in bodies:
             return full
-        if side is not None and f"{full}.{side}" in known:
+        if side is not None and f"{full}.{side}" in bodies:
             return f"{full}.{side}"
     return None
 
 
-def visible(scope: Scope, known: Mapping[str, Any]) -> list[str]:
+def visible(scope: Scope, bodies: Mapping[str, Any]) -> list[str]:
     """Return how the known bodies may be called from within an assembly, shortest forms first."""
     names: list[str] = []
     for depth in range(len(scope), -1, -1):
         prefix = "".join(f"{part}." for part in scope[:depth])
-        names += [full.removeprefix(prefix) for full in known if full.startswith(prefix)]
+        names += [full.removeprefix(prefix) for full in bodies if full.startswith(prefix)]
     return list(dict.fromkeys(names))
 
 
@@ -162,18 +162,18 @@ def name_faults(parts: Mapping[str, Any]) -> list[Fault]:
     """Return every fault of the names in a vehicle's tables; the faults' file is left empty."""
     if too_many := size_faults(parts):
         return too_many
-    known, faults = body_names(parts)
-    for key, found, allowed in _wrong_names(parts, known):
+    kinds, faults = body_names(parts)
+    for key, found, allowed in _wrong_names(parts, kinds):
         # a hint takes time, and further faults are only counted
         faults.append(Fault("", key, found, allowed() if len(faults) < MOST_FAULTS else ""))
     return list(dict.fromkeys(faults))
 
 
-def _wrong_names(parts: Mapping[str, Any], known: Mapping[str, str]) -> Iterator[Wrong]:
-    wheelsets = {full: kind for full, kind in known.items() if kind == "wheelset"}
+def _wrong_names(parts: Mapping[str, Any], kinds: Mapping[str, str]) -> Iterator[Wrong]:
+    wheelsets = {full: kind for full, kind in kinds.items() if kind == "wheelset"}
     if not wheelsets:
         yield "wheelsets", "no wheelset", lambda: "a vehicle needs one at least"
-    yield from _wrong_references(parts, known)
+    yield from _wrong_references(parts, kinds)
     used: set[str] = set()
     for group in groups(parts):
         for name, axlebox in _members(group.parts, "axleboxes").items():
@@ -182,38 +182,38 @@ def _wrong_names(parts: Mapping[str, Any], known: Mapping[str, str]) -> Iterator
         for name, element in _members(group.parts, "elements").items():
             key = ".".join((*group.path, "elements", name))
             for sided, side in sided_names(name, element.get("sides")):
-                yield from _wrong_ends(element, group, side, known, f"{key}.bodies")
+                yield from _wrong_ends(element, group, side, kinds, f"{key}.bodies")
                 if group.full(sided) in used:
                     found = f"the name '{group.full(sided)}' is used twice"
                     yield key, found, lambda: "give each element a name of its own"
                 used.add(group.full(sided))
 
 
-def _wrong_references(parts: Mapping[str, Any], known: Mapping[str, str]) -> Iterator[Wrong]:
+def _wrong_references(parts: Mapping[str, Any], kinds: Mapping[str, str]) -> Iterator[Wrong]:
     """Wrong names outside assemblies: the reference body, sensors."""
-    candidates = {full for full, kind in known.items() if kind != "axlebox"}
-    named = {"reference": parts.get("reference")}
+    candidates = {full for full, kind in kinds.items() if kind != "axlebox"}
+    references = {"reference": parts.get("reference")}
     service = parts.get("service")
     points = _members(service, "points") if isinstance(service, Mapping) else {}
     for table, members in (("service.points", points), ("sensors", _members(parts, "sensors"))):
-        named |= {f"{table}.{name}.body": point.get("body") for name, point in members.items()}
+        references |= {f"{table}.{name}.body": point.get("body") for name, point in members.items()}
         for sensor in members:
             if STANDARD.fullmatch(sensor) or (members is not points and sensor in points):
                 found = "the name of another sensor, in whose place it would be"
                 yield f"{table}.{sensor}", found, lambda: "a name of its own"
-    for key, name in named.items():
+    for key, name in references.items():
         if isinstance(name, str) and name not in candidates:
             yield key, f"no body '{name}'", partial(nearest, name, candidates)
 
 
 def _wrong_ends(
-    element: Mapping[str, Any], group: Group, side: str | None, known: Mapping[str, str], key: str
+    element: Mapping[str, Any], group: Group, side: str | None, kinds: Mapping[str, str], key: str
 ) -> Iterator[Wrong]:
     bodies = element.get("bodies")
     if not isinstance(bodies, list | tuple):
         return
     for index, name in enumerate(bodies):
-        yield from group.unknown(name, side, known, f"{key}.{index}", "body")
-    ends = [resolve(name, group.scope, side, known) for name in bodies if isinstance(name, str)]
+        yield from group.unknown(name, side, kinds, f"{key}.{index}", "body")
+    ends = [resolve(name, group.scope, side, kinds) for name in bodies if isinstance(name, str)]
     if len(ends) == 2 and ends[0] is not None and ends[0] == ends[1]:
         yield key, f"both ends are on '{bodies[0]}'", lambda: "two different bodies"

@@ -42,7 +42,7 @@ def body_boxes(flat: FlatVehicle) -> dict[str, Box]:
                 if name:
                     points[name].append(point)
     return {
-        body.name: _car(flat) if body.name == flat.reference else _around(body, points[body.name])
+        body.name: _car(flat) if body.name == flat.reference else _box(body, points[body.name])
         for body in flat.of_kind("body")
     }
 
@@ -53,9 +53,9 @@ def _car(flat: FlatVehicle) -> Box:
     return Box((min(ends) - OVERHANG, -0.5 * WIDTH, -ROOF), high)
 
 
-def _around(body: FlatBody, points: list[Vector]) -> Box:
-    there = np.array(points)
-    low, high = there.min(axis=0) - PADDING, there.max(axis=0) + PADDING
+def _box(body: FlatBody, points: list[Vector]) -> Box:
+    array = np.array(points)
+    low, high = array.min(axis=0) - PADDING, array.max(axis=0) + PADDING
     high[2] = max(min(high[2], -0.1), body.position[2] + PADDING[2])  # not into the rails
     x, y, z = map(float, low)
     return Box((x, y, z), (float(high[0]), float(high[1]), float(high[2])))
