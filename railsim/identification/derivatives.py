@@ -22,7 +22,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import argument_error, nearest
-from railsim.identification.parameters import Model, Parameter, parsed
+from railsim.identification.parameters import Model, Parameter, parse_keys
 from railsim.identification.problem import Workers
 from railsim.measurement.counterpart import outputs_for, series
 from railsim.processes import available_cores
@@ -92,18 +92,18 @@ class Sensitivity:
     def __getitem__(self, key: tuple[str, str]) -> Floats:
         """Return the derivative of an output to a parameter, ``[output, parameter]``."""
         if key not in self.derivatives:
-            known = map(str, self.derivatives)
-            raise KeyError(f"no derivative {key!r}; {nearest(str(key), known)}")
+            names = map(str, self.derivatives)
+            raise KeyError(f"no derivative {key!r}; {nearest(str(key), names)}")
         return self.derivatives[key].value
 
     def table(self) -> Table:
         """Return norms (rms of histories) and accuracies of all derivatives."""
         rows = []
-        for (output, name), one in self.derivatives.items():
+        for (output, name), derivative in self.derivatives.items():
             base = float(np.sqrt(np.mean(self.base[output] ** 2)))
-            size = float(np.sqrt(np.mean(one.value**2)))
-            smooth = "yes" if one.is_smooth else "no"
-            rows.append([output, name, base, size, one.error, one.step, smooth])
+            size = float(np.sqrt(np.mean(derivative.value**2)))
+            smooth = "yes" if derivative.is_smooth else "no"
+            rows.append([output, name, base, size, derivative.error, derivative.step, smooth])
         return Table(
             [
                 Column("output"),
@@ -128,11 +128,11 @@ class _Job:
     model: Model
     parameters: tuple[Parameter, ...]
     outputs: tuple[Output, ...]
-    how: Mapping[str, Any]
+    options: Mapping[str, Any]
 
     def result(self, x: Floats) -> Result:
-        own = self.model.with_parameters(self.parameters, x)
-        return simulate(own.vehicle, own.track, profiles=own.profiles, **self.how)
+        model = self.model.with_parameters(self.parameters, x)
+        return simulate(model.vehicle, model.track, profiles=model.profiles, **self.options)
 
     def variants(self, points: Sequence[Floats], pool: Workers) -> list[list[Floats]]:
         """Return the outputs of variants, which are simulated together."""
@@ -145,10 +145,10 @@ class _Job:
     def read(self, result: Result) -> list[Floats]:
         if result.status != "complete":
             raise argument_error("parameters", f"a variant {result.status}", "a run that ends")
-        found = [
-            series(result, one) if isinstance(one, str) else one(result) for one in self.outputs
+        values = [
+            series(result, item) if isinstance(item, str) else item(result) for item in self.outputs
         ]
-        return [np.atleast_1d(np.asarray(values, dtype=np.float64)) for values in found]
+        return [np.atleast_1d(np.asarray(x, dtype=np.float64)) for x in values]
 
 
 def sensitivity(
@@ -201,60 +201,60 @@ def sensitivity(
     """
     if scheme not in ("central", "forward"):
         raise argument_error("scheme", scheme, "central or forward")
-    named = dict(outputs) if isinstance(outputs, Mapping) else {one: one for one in outputs}
-    wanted = parsed(parameters, vehicle, track)
-    settings = _settings(settings, named)
-    how = {**run, "settings": settings}
-    job = _Job(Model(vehicle, track, profiles), tuple(wanted), tuple(named.values()), how)
-    result = job.result(np.zeros(len(wanted)))
+    selected = dict(outputs) if isinstance(outputs, Mapping) else {name: name for name in outputs}
+    chosen = parse_keys(parameters, vehicle, track)
+    settings = _settings(settings, selected)
+    options = {**run, "settings": settings}
+    job = _Job(Model(vehicle, track, profiles), tuple(chosen), tuple(selected.values()), options)
+    result = job.result(np.zeros(len(chosen)))
     if settings.drive.mode == "constant":
         fixed = settings.replace(step=float(result.attributes["step"]))
-        job = replace(job, how={**run, "settings": fixed})
+        job = replace(job, options={**run, "settings": fixed})
     try:
         base = job.read(result)
     except KeyError as error:
         raise argument_error("outputs", str(error.args[0])) from None
     differences = _forward if scheme == "forward" else _central
     with Workers(workers or available_cores()) as pool:
-        found, runs = differences(job, base, pool)
+        rows, runs = differences(job, base, pool)
     derivatives = {
-        (output, one.name): found[k][j]
-        for k, output in enumerate(named)
-        for j, one in enumerate(wanted)
+        (output, parameter.name): rows[k][j]
+        for k, output in enumerate(selected)
+        for j, parameter in enumerate(chosen)
     }
     remarks = [
         f"{output} does not depend on {name}: what it changes by is within rounding."
-        if one.rounding > STATUS
-        else f"{output} has no derivative to {name}: its two sides differ by {100 * one.error:.0f}"
-        + (f" % ({100 * one.kinked:.3g} % of the values)" if np.isfinite(one.kinked) else " %")
+        if d.rounding > STATUS
+        else f"{output} has no derivative to {name}: its two sides differ by {100 * d.error:.0f}"
+        + (f" % ({100 * d.kinked:.3g} % of the values)" if np.isfinite(d.kinked) else " %")
         + "; flange, stop, lifted wheel or sticking friction."
-        for (output, name), one in derivatives.items()
-        if not one.is_smooth
+        for (output, name), d in derivatives.items()
+        if not d.is_smooth
     ]
     return Sensitivity(
-        tuple(wanted), tuple(named), result,
-        dict(zip(named, base, strict=True)), derivatives, runs, tuple(remarks),
+        tuple(chosen), tuple(selected), result,
+        dict(zip(selected, base, strict=True)), derivatives, runs, tuple(remarks),
     )  # fmt: skip
 
 
-def _settings(settings: Settings | None, named: Mapping[str, Output]) -> Settings:
+def _settings(settings: Settings | None, selected: Mapping[str, Output]) -> Settings:
     """Return settings whose outputs hold what is asked for."""
     settings = settings or Settings()
-    selections = [one for one in named.values() if isinstance(one, str)]
+    selections = [output for output in selected.values() if isinstance(output, str)]
     if not selections:
         return settings
     try:
-        wanted = outputs_for(selections)
+        needed = outputs_for(selections)
     except KeyError as error:
         raise argument_error("outputs", f"no quantity {error}") from None
     outputs = settings.outputs
     values = {
         key: value
-        for key, value in wanted.items()
+        for key, value in needed.items()
         if key not in ("quantities", "elements") and not getattr(outputs, key)
     }
-    if "elements" in wanted:
-        values["elements"] = (*outputs.elements, *wanted["elements"])
+    if "elements" in needed:
+        values["elements"] = (*outputs.elements, *needed["elements"])
     return settings.replace(outputs={**outputs.model_dump(exclude_none=True), **values})
 
 
@@ -267,52 +267,52 @@ def _forward(job: _Job, base: list[Floats], pool: Workers) -> tuple[list[list[De
     count = len(job.parameters)
     step = FIRST / SHORTER
     *moved, together = job.variants([*(step * np.eye(count)), np.full(count, -step)], pool)
-    found = []
+    rows = []
     for k, y in enumerate(base):
-        values = [(one[k] - y) / step for one in moved]
+        values = [(variant[k] - y) / step for variant in moved]
         linear, whole = -step * np.sum(values, axis=0), together[k] - y
         error = _size(whole - linear) / max(_size(linear), LEAST * _size(whole), 1e-300)
-        found.append(
+        rows.append(
             [Derivative(v, error, step, rounding=_rounding(y, step * _size(v))) for v in values]
         )
-    return found, count + 2
+    return rows, count + 2
 
 
 def _central(job: _Job, base: list[Floats], pool: Workers) -> tuple[list[list[Derivative]], int]:
     """As `_forward`, with steps that are shortened."""
     count, step, runs = len(job.parameters), FIRST, 1
-    found: dict[tuple[int, int], Derivative] = {}
+    best: dict[tuple[int, int], Derivative] = {}
     ratios = np.full((len(base), count), np.nan)
     waiting = list(range(count))
     for _ in range(1 + MOST_TIMES):
         points = [sign * step * np.eye(count)[j] for j in waiting for sign in (1.0, -1.0)]
         moved = job.variants(points, pool)
         runs += len(points)
-        again = []
+        remaining = []
         for j, above, below in zip(waiting, moved[::2], moved[1::2], strict=True):
             shorter = False
             for k, y in enumerate(base):
-                before = found.get((k, j))
-                new, ratio = _one(y, above[k], below[k], step, before)
+                before = best.get((k, j))
+                new, ratio = _central_derivative(y, above[k], below[k], step, before)
                 if before is None or new.error < before.error:
-                    found[k, j] = new
+                    best[k, j] = new
                 else:  # with what it does not agree with
-                    found[k, j] = replace(before, error=new.error)
+                    best[k, j] = replace(before, error=new.error)
                 shorter |= ratio > TOLERANCE and not ratio > KINK * ratios[k, j]
                 ratios[k, j] = ratio
-            again += [j] if shorter else []
-        waiting = again
+            remaining += [j] if shorter else []
+        waiting = remaining
         step /= SHORTER
         if not waiting:
             break
-    return [[found[k, j] for j in range(count)] for k in range(len(base))], runs
+    return [[best[k, j] for j in range(count)] for k in range(len(base))], runs
 
 
 def _rounding(y: Floats, change: float) -> float:
     return 1e-13 * _size(y) / max(change, 1e-300)
 
 
-def _one(
+def _central_derivative(
     y: Floats, above: Floats, below: Floats, step: float, before: Derivative | None
 ) -> tuple[Derivative, float]:
     """Return a central derivative and the difference of its sides as a share of it."""

@@ -24,12 +24,12 @@ from railsim.identification.identified import (
     Channel,
     Identified,
     Place,
-    coloured,
+    residual_remark,
 )
-from railsim.identification.parameters import Parameter, parsed
+from railsim.identification.parameters import Parameter, parse_keys
 from railsim.identification.problem import STRETCH, Problem, Workers
 from railsim.identification.residuals import FORMS, Form, banded, whiteness
-from railsim.identification.runs import FEWEST, model_of, prepared, track_of
+from railsim.identification.runs import FEWEST, model_of, prepare_run, track_of
 from railsim.measurement import Measurement, load_measurement
 from railsim.measurement.alignment import common_shift
 from railsim.measurement.likeness import suspicions
@@ -101,40 +101,40 @@ def identify(
     ModelError
         A variant without equilibrium.
     """
-    _checked(band, form, loss, workers)
+    _check_arguments(band, form, loss, workers)
     files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
-    places = [Path(one).resolve() for one in files if not isinstance(one, Measurement)]
-    for twice in {one.name for one in places if places.count(one) > 1}:
-        words = f"{twice} is given twice"
+    places = [Path(file).resolve() for file in files if not isinstance(file, Measurement)]
+    for name in {place.name for place in places if places.count(place) > 1}:
+        words = f"{name} is given twice"
         raise argument_error("measured", words, "each run once", option="MEASURED.toml")
-    runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in files]
+    runs = [file if isinstance(file, Measurement) else load_measurement(file) for file in files]
     if not runs:
         raise argument_error("measured", "none", "one measured run at least")
     model = model_of(vehicle, runs, track)
-    wanted = parsed(parameters, model.vehicle, model.track)
-    ready = [prepared(run, model, band, track or track_of(run)) for run in runs]
+    chosen = parse_keys(parameters, model.vehicle, model.track)
+    ready = [prepare_run(run, model, band, track or track_of(run)) for run in runs]
     if form == "spectra" and any(
-        not row.size for one in ready for row in Form(form, band).features(one, one.measured)
+        not row.size for p in ready for row in Form(form, band).features(p, p.measured)
     ):
         found, allowed = f"{band[0]:g} to {band[1]:g} Hz", "frequencies in a third-octave band at "
         raise argument_error("band", found, f"{FEWEST} {allowed}least: a wider band, a longer run")
-    ready = [replace(one, run=one.run.with_step_of(model)) for one in ready]
+    ready = [replace(p, run=p.run.with_step_of(model)) for p in ready]
     place = place and form == "history"
-    kept = None if folder is None else Path(folder)
-    if kept is not None:
-        make_folder(kept, "folder")
+    cache = None if folder is None else Path(folder)
+    if cache is not None:
+        make_folder(cache, "folder")
     with Workers(workers or available_cores()) as pool:
         problem = Problem(
-            model, wanted, ready, Form(form, band), place, pool, kept, progress or (lambda _: None)
+            model, chosen, ready, Form(form, band), place, pool, cache, progress or (lambda _: None)
         )
-        return _solved(problem, loss)
+        return _solve(problem, loss)
 
 
-def _checked(band: tuple[float, float], form: str, loss: str, workers: int | None) -> None:
+def _check_arguments(band: tuple[float, float], form: str, loss: str, workers: int | None) -> None:
     faults = Faults()
-    words = f"{band[0]:g} to {band[1]:g} Hz"
+    found = f"{band[0]:g} to {band[1]:g} Hz"
     rising = 0.0 < band[0] < band[1] < np.inf
-    faults.require(rising, "band", words, "two frequencies above 0 that rise")
+    faults.require(rising, "band", found, "two frequencies above 0 that rise")
     whole = workers is None or workers >= 1
     faults.require(whole, "workers", f"found {workers}", "a whole number above 0")
     for name, value, allowed in (("form", form, FORMS), ("loss", loss, LOSSES)):
@@ -142,30 +142,30 @@ def _checked(band: tuple[float, float], form: str, loss: str, workers: int | Non
     faults.check()
 
 
-def _solved(problem: Problem, loss: str) -> Identified:
+def _solve(problem: Problem, loss: str) -> Identified:
     x = np.zeros(problem.size)
     if problem.place:
         x[problem.count :] = _places(problem, x)
     remarks = [*_suspicions(problem, x, clocks=False)]
     start = x.copy()
-    bounds = np.array([one.bounds for one in problem.parameters]
+    bounds = np.array([p.bounds for p in problem.parameters]
                       + [(-np.inf, np.inf)] * (problem.size - problem.count)).T  # fmt: skip
     stated = problem.form.kind == "history"
-    known = stated and all(np.isfinite(one.noise).all() for one in problem.runs)
+    known = stated and all(np.isfinite(p.noise).all() for p in problem.runs)
     _weigh(problem, x, stated=stated)
-    x = _at_best_shares(problem, x)
-    near = stated and all(len(one.run.at) * one.step > LONG * PART for one in problem.runs)
+    x = _best_shares(problem, x)
+    near = stated and all(len(p.run.at) * p.step > LONG * PART for p in problem.runs)
     if near:
         # by the beginnings of the runs: near the solution at a low cost; their stretch says little
         short = problem.shortened(PART)
         _weigh(short, x, stated=True)
-        found, _ = _least(short, x, bounds, loss, COARSE)
+        near_x, _ = _least_squares(short, x, bounds, loss, COARSE)
         problem.simulations = short.simulations
-        x = np.concatenate([found[: problem.count], x[problem.count :]])
+        x = np.concatenate([near_x[: problem.count], x[problem.count :]])
         _weigh(problem, x, stated=stated)
     for tolerance in [FINE] if known else [*[COARSE][near:], *[FINE] * REWEIGHTED]:
-        x, settled = _least(problem, x, bounds, loss, tolerance)
-        if not settled:
+        x, converged = _least_squares(problem, x, bounds, loss, tolerance)
+        if not converged:
             remarks.append(f"The search has not settled after {MOST_STEPS} steps.")
         if known or not _weigh(problem, x, stated=stated):
             break
@@ -173,25 +173,25 @@ def _solved(problem: Problem, loss: str) -> Identified:
     if change > CLOSE:
         remarks.append(f"The last step changed a parameter by {change:.2g} standard deviations.")
     remarks += _suspicions(problem, x, clocks=True)
-    remarks += [f"{one.run.name}: {words}" for one in problem.runs
-                for words in one.measurement.remarks]  # fmt: skip
+    remarks += [f"{p.run.name}: {words}" for p in problem.runs
+                for words in p.measurement.remarks]  # fmt: skip
     return _outcome(problem, start, x, loss, list(dict.fromkeys(remarks)))
 
 
-def _least(
+def _least_squares(
     problem: Problem, x: Floats, bounds: Floats, loss: str, tolerance: float
 ) -> tuple[Floats, bool]:
     """Return the coordinates with the least sum of squares, and whether the search has settled."""
     from scipy.optimize import least_squares
 
     def vector(z: Floats) -> Floats:
-        return problem.tried(z - 1.0)
+        return problem.step_residuals(z - 1.0)
 
     def jacobian(z: Floats) -> Floats:
         return problem.derivatives_near(z - 1.0)
 
     # about 1, so that the first region of trust has the size of the parameters
-    found = least_squares(
+    solution = least_squares(
         vector,
         1.0 + np.clip(x, bounds[0] + 1e-9, bounds[1] - 1e-9),
         jacobian,
@@ -204,7 +204,7 @@ def _least(
         f_scale=SCALE,
         max_nfev=MOST_STEPS,
     )
-    return np.asarray(found.x) - 1.0, bool(found.success)
+    return np.asarray(solution.x) - 1.0, bool(solution.success)
 
 
 def _with_own_derivatives(
@@ -217,7 +217,7 @@ def _with_own_derivatives(
     change = np.inf
     for _ in range(MOST_TIMES):
         jacobian = problem.derivatives_at(x)
-        before, (x, _) = x, _least(problem, x, bounds, loss, FINE)
+        before, (x, _) = x, _least_squares(problem, x, bounds, loss, FINE)
         deviations = np.sqrt(np.diag(_covariance(problem, x, jacobian, loss)[0]))
         change = float(np.max(np.abs(x - before) / deviations))
         if np.max(np.abs(x - before)[: problem.count]) < SAME:
@@ -252,12 +252,12 @@ def _covariance(problem: Problem, x: Floats, jacobian: Floats, loss: str) -> tup
     return inflation * (right.T * inverse**2) @ right, inflation
 
 
-def _at_best_shares(problem: Problem, x: Floats) -> Floats:
+def _best_shares(problem: Problem, x: Floats) -> Floats:
     """Return coordinates with each share where it fits best: contacts have more than one valley."""
-    for k, one in enumerate(problem.parameters):
-        if one.is_share:
+    for k, parameter in enumerate(problem.parameters):
+        if parameter.is_share:
             points = list(np.tile(x, (SHARES, 1)))
-            for point, share in zip(points, np.linspace(*one.bounds, SHARES), strict=True):
+            for point, share in zip(points, np.linspace(*parameter.bounds, SHARES), strict=True):
                 point[k] = share
             sums = [float(row @ row) for row in problem.vectors(points)]
             x = points[int(np.argmin(sums))]
@@ -266,44 +266,44 @@ def _at_best_shares(problem: Problem, x: Floats) -> Floats:
 
 def _places(problem: Problem, x: Floats) -> Floats:
     """Return shift and stretch of each run by its most telling channels."""
-    found = []
-    for one, values in zip(problem.runs, problem.series(x), strict=True):
-        s = one.run.at
+    places = []
+    for prepared, values in zip(problem.runs, problem.series(x), strict=True):
+        s = prepared.run.at
         signals = [
             (s, measured, s[inside], simulated[inside])
-            for measured, simulated in zip(one.measured, values, strict=True)
+            for measured, simulated in zip(prepared.measured, values, strict=True)
             if (inside := np.isfinite(simulated)).any()
         ]
         best = common_shift(signals)
-        found += [0.0, 0.0] if best is None else [best.shift, best.stretch / STRETCH]
-    return np.array(found)
+        places += [0.0, 0.0] if best is None else [best.shift, best.stretch / STRETCH]
+    return np.array(places)
 
 
 def _suspicions(problem: Problem, x: Floats, *, clocks: bool) -> Iterator[str]:
-    for one, values in zip(problem.placed(x), problem.series(x), strict=True):
+    for prepared, values in zip(problem.placed(x), problem.series(x), strict=True):
         measured, simulated = (
             {
-                n: banded(x, one.step, problem.form.band)
-                for n, x in zip(one.names, rows, strict=True)
+                n: banded(x, prepared.step, problem.form.band)
+                for n, x in zip(prepared.names, rows, strict=True)
             }
-            for rows in (one.measured, values)
+            for rows in (prepared.measured, values)
         )
-        quantities = dict(zip(one.names, one.run.selections, strict=True))
-        for words in suspicions(measured, simulated, quantities, one.step, clocks=clocks):
-            yield f"{one.run.name}: {words}"
+        quantities = dict(zip(prepared.names, prepared.run.selections, strict=True))
+        for sentence in suspicions(measured, simulated, quantities, prepared.step, clocks=clocks):
+            yield f"{prepared.run.name}: {sentence}"
 
 
 def _weigh(problem: Problem, x: Floats, *, stated: bool) -> bool:
     """Set the weights, by noise or residuals; return whether one changes by over `SETTLED`."""
     before, problem.weights = problem.weights, []
-    for one, rows in zip(problem.placed(x), problem.residuals(x), strict=True):
-        noise = problem.form.expected(one) if stated else [np.nan] * len(rows)
-        floors = problem.form.features(one, one.measured, measured=True)
-        own = [
+    for prepared, rows in zip(problem.placed(x), problem.residuals(x), strict=True):
+        noise = problem.form.expected(prepared) if stated else [np.nan] * len(rows)
+        floors = problem.form.features(prepared, prepared.measured, measured=True)
+        levels = [
             level if np.isfinite(level) else max(_rms(row), (0.0 if before else FIRST) * _rms(all_))
             for row, level, all_ in zip(rows, noise, floors, strict=True)
         ]
-        problem.weights.append(np.array([1.0 / level if level > 0.0 else 0.0 for level in own]))
+        problem.weights.append(np.array([1.0 / level if level > 0.0 else 0.0 for level in levels]))
     if not before:
         return True
     pairs = zip(problem.weights, before, strict=True)
@@ -321,10 +321,10 @@ def _outcome(
     count = problem.count
     jacobian = problem.derivatives_near(x)
     # what nothing depends on goes back to the file's value: the search leaves it anywhere
-    silent = np.linalg.norm(jacobian, axis=0) * INFINITE < 1.0
-    back = np.where(silent, start, x)
-    if silent.any() and np.abs(problem.vector(back) - problem.vector(x)).max() < SILENT:
-        x = back
+    without_effect = np.linalg.norm(jacobian, axis=0) * INFINITE < 1.0
+    reset = np.where(without_effect, start, x)
+    if without_effect.any() and np.abs(problem.vector(reset) - problem.vector(x)).max() < SILENT:
+        x = reset
     covariance, inflation = _covariance(problem, x, jacobian, loss)
     jacobian = np.sqrt(_counting(problem.vector(x), loss))[:, None] * jacobian
     data = len(jacobian) - len(problem.before(x))
@@ -333,30 +333,30 @@ def _outcome(
         problem.placed(x), problem.residuals(x), problem.weights, problem.series(start),
         problem.series(x), strict=True,
     )  # fmt: skip
-    for one, rows, weights, before, after in series:
-        wholes = problem.form.features(one, one.measured, measured=True)
-        for j, (name, row, whole) in enumerate(zip(one.names, rows, wholes, strict=True)):
+    for p, rows, weights, before, after in series:
+        wholes = problem.form.features(p, p.measured, measured=True)
+        for j, (name, row, whole) in enumerate(zip(p.names, rows, wholes, strict=True)):
             tested = problem.form.kind == "history" and _rms(row) > NEGLIGIBLE * _rms(whole)
             test = whiteness(row) if tested else (np.nan, np.nan)
             channels.append(Channel(
-                one.run.name, name, one.run.selections[j], one.step, one.run.at,
-                one.measured[j], before[j], after[j], _rms(weights[j] * row), *test,
+                p.run.name, name, p.run.selections[j], p.step, p.run.at,
+                p.measured[j], before[j], after[j], _rms(weights[j] * row), *test,
             ))  # fmt: skip
     # directions of the parameters alone: what the places of the runs could explain is eliminated
-    own, by_places = jacobian[:data, :count], jacobian[:data, count:]
+    alone, by_places = jacobian[:data, :count], jacobian[:data, count:]
     if by_places.shape[1]:
         basis, _ = np.linalg.qr(by_places)
-        own = own - basis @ (basis.T @ own)
-    _, values, vectors = np.linalg.svd(own, full_matrices=False)
+        alone = alone - basis @ (basis.T @ alone)
+    _, values, vectors = np.linalg.svd(alone, full_matrices=False)
     places = [
-        Place(one.run.name, float(shift), STRETCH * float(stretch))
-        for one, (shift, stretch) in zip(
+        Place(p.run.name, float(shift), STRETCH * float(stretch))
+        for p, (shift, stretch) in zip(
             problem.runs if problem.place else (), np.reshape(x[count:], (-1, 2)), strict=True
         )
     ]
-    remarks += _stretched(places, STRETCH * np.sqrt(np.diag(covariance))[count + 1 :: 2])
-    remarks += _at_bounds(problem.parameters, x)
-    remarks += filter(None, [coloured((one.name, one.is_white) for one in channels)])
+    remarks += _stretch_remarks(places, STRETCH * np.sqrt(np.diag(covariance))[count + 1 :: 2])
+    remarks += _bound_remarks(problem.parameters, x)
+    remarks += filter(None, [residual_remark((c.name, c.is_white) for c in channels)])
     return Identified(
         problem.model.vehicle, tuple(problem.parameters), x[:count], covariance[:count, :count],
         values, vectors, tuple(channels), tuple(places), problem.form.kind, problem.form.band,
@@ -364,7 +364,7 @@ def _outcome(
     )  # fmt: skip
 
 
-def _stretched(places: Sequence[Place], deviations: Floats) -> list[str]:
+def _stretch_remarks(places: Sequence[Place], deviations: Floats) -> list[str]:
     """Say whose arc length is stretched, its standard deviation being known: not what is noise."""
     return [
         f"{place.run}: its arc length is stretched by {1e3 * place.stretch:+.2f} m/km: distance, "
@@ -374,13 +374,13 @@ def _stretched(places: Sequence[Place], deviations: Floats) -> list[str]:
     ]
 
 
-def _at_bounds(parameters: Sequence[Parameter], x: Floats) -> Iterator[str]:
+def _bound_remarks(parameters: Sequence[Parameter], x: Floats) -> Iterator[str]:
     """Say which parameters end at a bound; a share of 0 or 1 is one of the profiles itself."""
-    for one, coordinate in zip(parameters, x, strict=False):
-        reach = min(SAME, NARROW * (one.bounds[1] - one.bounds[0]))
-        for bound, end in zip(one.bounds, (one.low, one.high), strict=True):
-            if abs(coordinate - bound) < reach and not (one.is_share and end in (0.0, 1.0)):
+    for parameter, coordinate in zip(parameters, x, strict=False):
+        reach = min(SAME, NARROW * (parameter.bounds[1] - parameter.bounds[0]))
+        for bound, end in zip(parameter.bounds, (parameter.low, parameter.high), strict=True):
+            if abs(coordinate - bound) < reach and not (parameter.is_share and end in (0.0, 1.0)):
                 yield (
-                    f"{one.name} {AT_BOUND} of {end:g}: the best value may lie beyond it, "
+                    f"{parameter.name} {AT_BOUND} of {end:g}: the best value may lie beyond it, "
                     "and the intervals do not hold."
                 )

@@ -14,7 +14,7 @@ from railsim.arrays import Floats
 from railsim.definitions.base import FrozenDict
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.files.access import check_file, relative, whole_file
-from railsim.identification.parameters import TRACK, Parameter, blended, present, scaled
+from railsim.identification.parameters import TRACK, Parameter, blended, find_value, scaled
 from railsim.identification.residuals import banded
 from railsim.profiles import save_profile
 from railsim.profiles.used import exchanged_wheels
@@ -132,12 +132,12 @@ class Identified:
     @cached_property
     def values(self) -> Mapping[str, Any]:
         """Identified values by the whole keys of the vehicle's file [SI]."""
-        found = {}
+        values = {}
         for parameter, factor in zip(self.parameters, self.factors, strict=True):
             for key in parameter.of_vehicle:
-                path, value = present(self.vehicle, key)
-                found[".".join(path)] = scaled(value, float(factor))
-        return FrozenDict(found)
+                path, value = find_value(self.vehicle, key)
+                values[".".join(path)] = scaled(value, float(factor))
+        return FrozenDict(values)
 
     @property
     def fitted(self) -> Vehicle:
@@ -147,7 +147,7 @@ class Identified:
     @property
     def unidentified(self) -> tuple[str, ...]:
         """What the data cannot tell apart, a sentence for each combination."""
-        said = []
+        texts = []
         scale = np.sqrt(self.inflation)
         for value, row in zip(self.singular_values, self.combinations, strict=True):
             spread = scale / value if value > 0.0 else np.inf
@@ -158,17 +158,17 @@ class Identified:
             known = "infinite" if spread > INFINITE else f"{100 * spread:.0f} %"
             names = [self.parameters[k].name for k in parts]
             if len(parts) == 1:
-                said.append(f"The data say nothing about {names[0]} (standard deviation {known}).")
+                texts.append(f"The data say nothing about {names[0]} (standard deviation {known}).")
                 continue
             changes = ", ".join(
                 f"{self.parameters[k].name} by {10 * row[k] / row[parts[0]]:+.1f} %" for k in parts
             )
-            said.append(
+            texts.append(
                 f"The data cannot tell apart {', '.join(names[:-1])} and {names[-1]}: a change of "
                 f"{changes} at once leaves the channels as they are (standard deviation of this "
                 f"combination {known})."
             )
-        return tuple(said)
+        return tuple(texts)
 
     def table(self) -> Table:
         """Return values, standard deviations and intervals by parameter."""
@@ -186,15 +186,15 @@ class Identified:
         """Return the identified value of a parameter of one number."""
         if not parameter.keys or parameter.keys[0].startswith(TRACK):
             return None
-        value = self.values[".".join(present(self.vehicle, parameter.keys[0])[0])]
+        value = self.values[".".join(find_value(self.vehicle, parameter.keys[0])[0])]
         return None if isinstance(value, list) else float(value)
 
-    def _misfit(self, one: Channel, simulated: Floats) -> float:
+    def _misfit(self, channel: Channel, simulated: Floats) -> float:
         """Return the rms of measured less simulated in the band, in % of the measured rms."""
-        known = np.isfinite(one.measured) & np.isfinite(simulated)
-        measured, simulated = (np.where(known, x, np.nan) for x in (one.measured, simulated))
-        rows = (banded(x, one.step, self.band) for x in (measured - simulated, measured))
-        difference, scale = (float(np.sqrt(np.sum(row[known] ** 2))) for row in rows)
+        valid = np.isfinite(channel.measured) & np.isfinite(simulated)
+        measured, simulated = (np.where(valid, x, np.nan) for x in (channel.measured, simulated))
+        rows = (banded(x, channel.step, self.band) for x in (measured - simulated, measured))
+        difference, scale = (float(np.sqrt(np.sum(row[valid] ** 2))) for row in rows)
         return 100.0 * difference / scale if scale else np.nan
 
     def record(self) -> dict[str, Any]:
@@ -220,15 +220,15 @@ class Identified:
             "unidentified": list(self.unidentified),
             "channels": [
                 {
-                    "run": one.run,
-                    "channel": one.name,
-                    "before": self._misfit(one, one.before),
-                    "after": self._misfit(one, one.after),
-                    "level": one.level,
-                    "probability": one.probability,
-                    "white": one.is_white if np.isfinite(one.probability) else None,
+                    "run": channel.run,
+                    "channel": channel.name,
+                    "before": self._misfit(channel, channel.before),
+                    "after": self._misfit(channel, channel.after),
+                    "level": channel.level,
+                    "probability": channel.probability,
+                    "white": channel.is_white if np.isfinite(channel.probability) else None,
                 }
-                for one in self.channels
+                for channel in self.channels
             ],
             "places": [dict(vars(place)) for place in self.places],
             "form": self.form,
@@ -272,73 +272,73 @@ class Identified:
         self, path: Path, base: str | Path | None, files: Mapping[str, tuple[str, str]]
     ) -> str:
         """Return the text; `files` and remarks of the identified profiles by the original's."""
-        runs = ", ".join(dict.fromkeys(one.run for one in self.channels))
+        runs = ", ".join(dict.fromkeys(channel.run for channel in self.channels))
         head = [f"# Identified from {runs}: [I] identified by least squares, with the standard",
                 "# deviation of the value."]  # fmt: skip
         shares = zip(self.parameters, self.factors, self.deviations, strict=True)
         head += [
-            f"# Of the track: {parameter.name} x {factor:.4g} {_known(spread)}."
+            f"# Of the track: {parameter.name} x {factor:.4g} {_spread_text(spread)}."
             for parameter, factor, spread in shares
             if parameter.of_vehicle != parameter.keys
         ]
-        head += [f"# {words}" for words in self.remarks if AT_BOUND in words]
+        head += [f"# {remark}" for remark in self.remarks if AT_BOUND in remark]
         wheels = exchanged_wheels(self.vehicle, {n: file for n, (file, _) in files.items()})
         if base is None:
             vehicle = self.fitted.with_values(wheels) if wheels else self.fitted
             return "\n".join([*head, vehicle.to_toml()])
-        known = Path(base)
-        if known.suffix == ".toml":
-            base = relative(known.resolve(), path.resolve().parent)
+        base_path = Path(base)
+        if base_path.suffix == ".toml":
+            base = relative(base_path.resolve(), path.resolve().parent)
         extended = tomli_w.dumps({"extends": str(base)}).strip()
         lines = [*head, 'format = "railsim-vehicle/1"', extended, ""]
         tables: dict[str, list[str]] = {}
         for parameter, spread in zip(self.parameters, self.deviations, strict=True):
             for key in parameter.of_vehicle:
-                keys, _ = present(self.fitted, key)
+                keys, _ = find_value(self.fitted, key)
                 whole = keys[:-1] if keys[-1] in "xyz" or keys[-1].isdecimal() else keys
-                value = present(self.fitted, ".".join(whole))[1]
-                written = tomli_w.dumps({whole[-1]: value}).strip().replace("\n", " ")
+                value = find_value(self.fitted, ".".join(whole))[1]
+                assignment = tomli_w.dumps({whole[-1]: value}).strip().replace("\n", " ")
                 part = keys[-1] if keys != whole else ""
-                mark = f"{written}  # [I] {part} {_known(spread)}"
+                mark = f"{assignment}  # [I] {part} {_spread_text(spread)}"
                 tables.setdefault(".".join(whole[:-1]), []).append(" ".join(mark.split()))
         marks = "; ".join(mark for _, mark in files.values())
         for key, names in wheels.items():
             table, _, last = key.rpartition(".")
             tables.setdefault(table, []).append(f"{last} = {json.dumps(names)}  # {marks}")
         for table, entries in tables.items():
-            lines += [f"[{table}]" if table else "", *_merged(entries), ""]
+            lines += [f"[{table}]" if table else "", *_merge_vectors(entries), ""]
         return "\n".join(lines)
 
 
-def _known(spread: float) -> str:
+def _spread_text(spread: float) -> str:
     """Return a standard deviation in words."""
     return "not shown by the data" if spread > INFINITE else f"+- {100 * spread:.2g} %"
 
 
-def coloured(channels: Iterable[tuple[str, bool]]) -> str:
+def residual_remark(channels: Iterable[tuple[str, bool]]) -> str:
     """Say what residuals that are not white mean; nothing where all are.
 
     `channels`: names, and whether the residuals are white.
     """
-    known = list(channels)
-    names = list(dict.fromkeys(name for name, white in known if not white))
-    if names and not any(white for _, white in known):
+    pairs = list(channels)
+    names = list(dict.fromkeys(name for name, white in pairs if not white))
+    if names and not any(white for _, white in pairs):
         return (
             "The residuals of no channel are white: the model lacks something, and the values are "
             "not to be believed, whatever their intervals."
         )
-    which = f"The residuals of {', '.join(names)} are not white: the model lacks something"
-    return f"{which}, and the intervals are too narrow." if names else ""
+    sentence = f"The residuals of {', '.join(names)} are not white: the model lacks something"
+    return f"{sentence}, and the intervals are too narrow." if names else ""
 
 
 def parameter_table(record: Mapping[str, Any]) -> Table:
     """Return values, standard deviations and intervals of the record of an identification."""
     rows = []
-    for one in record["parameters"]:
-        ends = [x if x is not None and abs(x) < INFINITE else None for x in one["interval"]]
-        spread = one["standard_deviation"]
+    for row in record["parameters"]:
+        ends = [x if x is not None and abs(x) < INFINITE else None for x in row["interval"]]
+        spread = row["standard_deviation"]
         share = 100.0 * spread if spread < INFINITE else None
-        rows.append([one["name"], one["value"], one["factor"], share, *ends])
+        rows.append([row["name"], row["value"], row["factor"], share, *ends])
     return Table(
         [
             Column("parameter"),
@@ -354,7 +354,7 @@ def parameter_table(record: Mapping[str, Any]) -> Table:
 
 def correlation_table(record: Mapping[str, Any]) -> Table:
     """Return the correlation matrix of the record of an identification."""
-    names = [one["name"] for one in record["parameters"]]
+    names = [row["name"] for row in record["parameters"]]
     columns = [Column("parameter"), *(Column(name, format=".2f") for name in names)]
     pairs = zip(names, record["correlation"], strict=True)
     return Table(columns, [[name, *row] for name, row in pairs], "Correlation of the values")
@@ -373,14 +373,14 @@ def residual_table(record: Mapping[str, Any]) -> Table:
             Column("probability", "p-value, white", format=".3f"),
             Column("white"),
         ],
-        [{**one, "white": words[one["white"]]} for one in record["channels"]],
+        [{**row, "white": words[row["white"]]} for row in record["channels"]],
     )
 
 
-def _merged(entries: list[str]) -> list[str]:
+def _merge_vectors(entries: list[str]) -> list[str]:
     """Return lines of a table; components of one vector are one line with several marks."""
-    found: dict[str, list[str]] = {}
+    marks_by_value: dict[str, list[str]] = {}
     for entry in entries:
         value, _, mark = entry.partition("# ")
-        found.setdefault(value.strip(), []).append(mark)
-    return [f"{value}  # {'; '.join(marks)}" for value, marks in found.items()]
+        marks_by_value.setdefault(value.strip(), []).append(mark)
+    return [f"{value}  # {'; '.join(marks)}" for value, marks in marks_by_value.items()]

@@ -87,8 +87,8 @@ class Model:
                 continue
             factor = math.exp(float(coordinate))
             for key in parameter.keys if factor != 1.0 else ():
-                kind, own = _side(key)
-                values[kind][own] = scaled(present(getattr(self, kind), own)[1], factor)
+                kind, inner = _side(key)
+                values[kind][inner] = scaled(find_value(getattr(self, kind), inner)[1], factor)
         changed = {k: getattr(self, k).with_values(v) for k, v in values.items() if v}
         return replace(self, profiles=profiles or None, **changed)
 
@@ -97,79 +97,79 @@ def _side(key: str) -> tuple[str, str]:
     return ("track", key.removeprefix(TRACK)) if key.startswith(TRACK) else ("vehicle", key)
 
 
-def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> list[Parameter]:
+def parse_keys(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> list[Parameter]:
     """Return parameters from texts ``KEY[+KEY...][:LOW:HIGH[:SPREAD]]``, checked.
 
     Raises InputError: keys that lead nowhere or hold no number, bounds that do not enclose the
     value.
     """
-    found: list[Parameter] = []
+    chosen: list[Parameter] = []
     faults = Faults()
     taken: list[tuple[str, ...]] = []
     for text in texts:
         try:
-            one = _parsed(text) if isinstance(text, str) else text
+            p = _parse(text) if isinstance(text, str) else text
             used = [name for _, name, _ in used_profiles(vehicle)]
-            if one.is_share and one.profiles[0] not in used:
-                words = f"{vehicle.name} has no wheels with '{one.profiles[0]}'"
-                raise ValueError(words, nearest(one.profiles[0], used))
-            places: list[tuple[str, ...]] = [(WHEEL, one.profiles[0])] if one.is_share else []
-            for key in one.keys:
-                kind, own = _side(key)
-                path, value = present({"vehicle": vehicle, "track": track}[kind], own)
+            if p.is_share and p.profiles[0] not in used:
+                found = f"{vehicle.name} has no wheels with '{p.profiles[0]}'"
+                raise ValueError(found, nearest(p.profiles[0], used))
+            places: list[tuple[str, ...]] = [(WHEEL, p.profiles[0])] if p.is_share else []
+            for key in p.keys:
+                kind, inner = _side(key)
+                path, value = find_value({"vehicle": vehicle, "track": track}[kind], inner)
                 if kind == "track" and path[0] == "friction" and track.friction_table:
-                    words = "the track has a friction_table in its place"
-                    raise ValueError(words, "track.friction_table")
+                    found = "the track has a friction_table in its place"
+                    raise ValueError(found, "track.friction_table")
                 if not _scalable(value):
-                    words = f"{'.'.join(path)} is {value!r}"[:100]
-                    raise ValueError(words, "a number that is not 0")
+                    found = f"{'.'.join(path)} is {value!r}"[:100]
+                    raise ValueError(found, "a number that is not 0")
                 places.append((kind, *path))
             for place in places:
                 if any(place[: len(other)] == other[: len(place)] for other in taken):
                     raise ValueError(f"{place[-1]} is given twice", "each value once")
                 taken.append(place)
-            found.append(one)
+            chosen.append(p)
         except (KeyError, ValueError) as error:
-            shown = text if isinstance(text, str) else text.name
-            told = [*map(str, error.args), ""][:2]
-            faults.append(argument_fault("parameters", shown, *told))
+            label = text if isinstance(text, str) else text.name
+            messages = [*map(str, error.args), ""][:2]
+            faults.append(argument_fault("parameters", label, *messages))
         except InputError as error:
             faults += error.faults
-    if not faults and not found:
+    if not faults and not chosen:
         faults.append(argument_fault("parameters", "", "none", "one key at least"))
     faults.check()
-    return found
+    return chosen
 
 
-def _parsed(text: str) -> Parameter:
+def _parse(text: str) -> Parameter:
     keys, *rest = [text] if text.startswith(WHEEL) else text.split(":")
     if text.startswith(WHEEL):
         _, first, second, *rest = [*text.split(":"), ""][: max(3, text.count(":") + 1)]
         if not first or not second:
             raise ValueError("two profiles are needed", "wheel:S1002:worn.csv")
-        one = Parameter(f"share of {second} in {first}", (), (first, second), 0.0, 1.0)
+        p = Parameter(f"share of {second} in {first}", (), (first, second), 0.0, 1.0)
         load_profile(first)
         load_profile(second)
     else:
-        one = Parameter(keys, tuple(part.strip() for part in keys.split("+")))
+        p = Parameter(keys, tuple(part.strip() for part in keys.split("+")))
     try:
         numbers = [float(part) for part in rest]
     except ValueError:
         raise ValueError(f"'{':'.join(rest)}'", "numbers LOW:HIGH or LOW:HIGH:SPREAD") from None
     if len(numbers) not in (0, 2, 3):
         raise ValueError(f"{len(numbers)} numbers", "LOW:HIGH or LOW:HIGH:SPREAD, as factors")
-    low, high = numbers[:2] if numbers else (one.low, one.high)
-    inside = 0.0 <= low < high <= 1.0 if one.is_share else 0.0 < low < 1.0 < high
+    low, high = numbers[:2] if numbers else (p.low, p.high)
+    inside = 0.0 <= low < high <= 1.0 if p.is_share else 0.0 < low < 1.0 < high
     spread = numbers[2] if len(numbers) == 3 else None
     if spread is not None and not spread > 0.0:
         raise ValueError(f"SPREAD {spread:g}", "a share of the value above 0, such as 0.2")
     if not inside:
-        allowed = "shares 0 to 1" if one.is_share else "factors below and above 1, such as 0.5:2"
+        allowed = "shares 0 to 1" if p.is_share else "factors below and above 1, such as 0.5:2"
         raise ValueError(f"bounds {low:.12g} to {high:.12g}", allowed)
-    return replace(one, low=low, high=high, spread=spread)
+    return replace(p, low=low, high=high, spread=spread)
 
 
-def present(definition: FileDefinition, key: str) -> tuple[list[str], Any]:
+def find_value(definition: FileDefinition, key: str) -> tuple[list[str], Any]:
     """Return the whole path of a key and what the definition has there; KeyError: nothing."""
     tables = tomllib.loads(definition.to_toml())
     path = full_path(tables, key_path(key))

@@ -83,13 +83,13 @@ class Problem:
         digest = hashlib.sha256(__version__.encode())
         for text in (self.model.vehicle.to_toml(), repr(self.parameters), self.form):
             digest.update(repr(text).encode())
-        for one in self.runs:
-            parts = (one.run.track.to_toml(), one.run.settings.to_toml(), repr(one.run.load))
-            filters = [(channel.low_pass, channel.high_pass) for channel in one.run.amplifiers]
-            digest.update(repr((*parts, one.run.speed, one.run.selections, filters)).encode())
-            digest.update(one.run.at.tobytes())
+        for p in self.runs:
+            parts = (p.run.track.to_toml(), p.run.settings.to_toml(), repr(p.run.load))
+            filters = [(channel.low_pass, channel.high_pass) for channel in p.run.amplifiers]
+            digest.update(repr((*parts, p.run.speed, p.run.selections, filters)).encode())
+            digest.update(p.run.at.tobytes())
         # files of profiles may be changed in between
-        definitions = self.model.vehicle, *(one.run.track for one in self.runs)
+        definitions = self.model.vehicle, *(p.run.track for p in self.runs)
         used = {name for definition in definitions for _, name, _ in used_profiles(definition)}
         for name in sorted(used.union(*(parameter.profiles for parameter in self.parameters))):
             digest.update(load_profile(name).key())
@@ -98,11 +98,11 @@ class Problem:
     def shortened(self, duration: float) -> "Problem":
         """Return the problem of the first seconds of each run."""
         runs = []
-        for one in self.runs:
-            n = int(duration / one.step)
-            end = float(one.run.at[n]) + 0.2 * one.run.speed
-            run = replace(one.run, at=one.run.at[:n], until=min(one.run.until, end))
-            runs.append(replace(one, run=run, measured=one.measured[:, :n]))
+        for prepared in self.runs:
+            n = int(duration / prepared.step)
+            end = float(prepared.run.at[n]) + 0.2 * prepared.run.speed
+            run = replace(prepared.run, at=prepared.run.at[:n], until=min(prepared.run.until, end))
+            runs.append(replace(prepared, run=run, measured=prepared.measured[:, :n]))
         return Problem(
             self.model, self.parameters, runs, self.form, self.place, self.workers, self.folder,
             self.progress, simulations=self.simulations,
@@ -124,26 +124,26 @@ class Problem:
             return list(self.runs)
         moves = np.reshape(x[self.count :], (-1, 2))
         return [
-            one.moved(float(shift), STRETCH * float(stretch))
-            for one, (shift, stretch) in zip(self.runs, moves, strict=True)
+            prepared.moved(float(shift), STRETCH * float(stretch))
+            for prepared, (shift, stretch) in zip(self.runs, moves, strict=True)
         ]
 
     def series(self, x: Floats) -> list[Floats]:
         """Return the simulated channels of all runs, float64[channel, time] each."""
         bases = zip(self._bases(x), self.runs, strict=True)
-        return [values[: len(one.names)] for values, one in bases]
+        return [values[: len(prepared.names)] for values, prepared in bases]
 
     def _bases(self, x: Floats, *, ahead: bool = False) -> list[Floats]:
         """Return the simulated channels, with their slopes below them where places are sought.
 
         With `ahead` the variants for the derivatives are simulated in the same call.
         """
-        wanted = [(x, k, self.place) for k in range(len(self.runs))]
-        if ahead and any(self._kept(*one) is None for one in wanted):
-            wanted += self._variants(x, central=False)[0]
-        return self._evaluated(wanted)[: len(self.runs)]
+        requests = [(x, k, self.place) for k in range(len(self.runs))]
+        if ahead and any(self._stored(*request) is None for request in requests):
+            requests += self._variants(x, central=False)[0]
+        return self._simulate(requests)[: len(self.runs)]
 
-    def tried(self, x: Floats) -> Floats:
+    def step_residuals(self, x: Floats) -> Floats:
         """Return `vector` at a step of the search.
 
         With several workers the variants for the derivatives are simulated in the same call, where
@@ -153,8 +153,8 @@ class Problem:
         return self.vector(x)
 
     def _is_near(self, x: Floats) -> bool:
-        at = self._derived
-        return at is not None and bool(np.max(np.abs((x - at)[: self.count])) <= NEAR)
+        last = self._derived
+        return last is not None and bool(np.max(np.abs((x - last)[: self.count])) <= NEAR)
 
     def derivatives_near(self, x: Floats) -> Floats:
         """Return derivatives of `vector` at a point near by, if they are known."""
@@ -173,29 +173,29 @@ class Problem:
         self, x: Floats, *, central: bool
     ) -> tuple[list[tuple[Floats, int, bool]], list[tuple[int, float]]]:
         """Return what is simulated for the derivatives: of each parameter one step or two."""
-        wanted: list[tuple[Floats, int, bool]] = []
+        requests: list[tuple[Floats, int, bool]] = []
         steps = []
         for k, parameter in enumerate(self.parameters):
             low, high = parameter.bounds
-            inside = [step for step in (STEP, -STEP) if low <= x[k] + step <= high]
-            inside = inside or [max(high - x[k], low - x[k], key=abs)]
-            for step in inside if central else inside[:1]:
+            steps_inside = [step for step in (STEP, -STEP) if low <= x[k] + step <= high]
+            steps_inside = steps_inside or [max(high - x[k], low - x[k], key=abs)]
+            for step in steps_inside if central else steps_inside[:1]:
                 moved = x.copy()
                 moved[k] += step
                 steps.append((k, step))
-                wanted += [(moved, number, False) for number in range(len(self.runs))]
-        return wanted, steps
+                requests += [(moved, number, False) for number in range(len(self.runs))]
+        return requests, steps
 
     def residuals(self, x: Floats) -> list[list[Floats]]:
         """Return measured less simulated, unweighted, for each run and channel."""
-        found = []
-        for one, values in zip(self.placed(x), self.series(x), strict=True):
+        rows = []
+        for prepared, values in zip(self.placed(x), self.series(x), strict=True):
             measured = self.form.features(
-                one, np.where(np.isfinite(values), one.measured, np.nan), measured=True
+                prepared, np.where(np.isfinite(values), prepared.measured, np.nan), measured=True
             )
-            features = self.form.features(one, values)
-            found.append([m - f for m, f in zip(measured, features, strict=True)])
-        return found
+            features = self.form.features(prepared, values)
+            rows.append([m - f for m, f in zip(measured, features, strict=True)])
+        return rows
 
     def vector(self, x: Floats) -> Floats:
         """Return all weighted residuals, those of what was known before at the end."""
@@ -208,20 +208,20 @@ class Problem:
 
     def vectors(self, points: Sequence[Floats]) -> list[Floats]:
         """Return `vector` at several points, which are simulated together."""
-        self._evaluated([(x, k, self.place) for x in points for k in range(len(self.runs))])
+        self._simulate([(x, k, self.place) for x in points for k in range(len(self.runs))])
         return [self.vector(x) for x in points]
 
     def before(self, x: Floats) -> Floats:
         """Return the weighted residuals of what was known before."""
-        return self._known_before @ x
+        return self._prior @ x
 
     @property
-    def _known_before(self) -> Floats:
+    def _prior(self) -> Floats:
         """Derivatives of the residuals of what was known before, float64[residual, coordinate]."""
         rows = [
-            -np.eye(self.size)[k] / one.spread
-            for k, one in enumerate(self.parameters)
-            if one.spread is not None
+            -np.eye(self.size)[k] / parameter.spread
+            for k, parameter in enumerate(self.parameters)
+            if parameter.spread is not None
         ]
         return np.reshape(rows, (-1, self.size))
 
@@ -229,25 +229,25 @@ class Problem:
         """Return the derivatives of `vector`, float64[residual, coordinate]."""
         self._bases(x, ahead=True)
         base = self.series(x)
-        wanted, steps = self._variants(x, central=central)
-        series = self._evaluated(wanted)
+        requests, steps = self._variants(x, central=central)
+        series = self._simulate(requests)
         placed = self.placed(x)
         columns = np.zeros((len(self.vector(x)), self.size))
         for number, (k, step) in enumerate(steps):
-            own = series[number * len(self.runs) : (number + 1) * len(self.runs)]
-            sides = sum(one == k for one, _ in steps)
-            columns[:, k] += self._difference(placed, base, own, step) / sides
-        for number, one in enumerate(placed if self.place else []):
-            slope = self._bases(x)[number][len(one.names) :]
-            along = one.run.at - one.run.at[0]
+            varied = series[number * len(self.runs) : (number + 1) * len(self.runs)]
+            sides = sum(index == k for index, _ in steps)
+            columns[:, k] += self._difference(placed, base, varied, step) / sides
+        for number, prepared in enumerate(placed if self.place else []):
+            slope = self._bases(x)[number][len(prepared.names) :]
+            along = prepared.run.at - prepared.run.at[0]
             for j, scale in enumerate((1.0, STRETCH * along)):
                 along_track = [b + (1e-6 * scale * slope if i == number else 0.0)
                          for i, b in enumerate(base)]  # fmt: skip
                 columns[:, self.count + 2 * number + j] = self._difference(
                     placed, base, along_track, 1e-6
                 )
-        known = self._known_before
-        columns[len(columns) - len(known) :] = known
+        prior = self._prior
+        columns[len(columns) - len(prior) :] = prior
         return columns
 
     def _difference(
@@ -255,37 +255,37 @@ class Problem:
     ) -> Floats:
         """Derivative of the residuals by a difference of series; zero of what was known before."""
         rows = []
-        for one, weights, before, after in zip(placed, self.weights, base, moved, strict=True):
-            features = (self.form.features(one, values) for values in (before, after))
+        for prepared, weights, before, after in zip(placed, self.weights, base, moved, strict=True):
+            features = (self.form.features(prepared, values) for values in (before, after))
             rows += [-w * (b - a) / step for w, a, b in zip(weights, *features, strict=True)]
-        return np.concatenate([*rows, np.zeros(len(self._known_before))])
+        return np.concatenate([*rows, np.zeros(len(self._prior))])
 
-    def _evaluated(self, wanted: Sequence[tuple[Floats, int, bool]]) -> list[Floats]:
+    def _simulate(self, requests: Sequence[tuple[Floats, int, bool]]) -> list[Floats]:
         """Return series of (coordinates, number of the run, slope or not)."""
-        found = [self._kept(*one) for one in wanted]
-        missing = [number for number, kept in enumerate(found) if kept is None]
+        series = [self._stored(*request) for request in requests]
+        missing = [number for number, kept in enumerate(series) if kept is None]
         tasks: list[Task] = []
-        for x, k, slope in (wanted[number] for number in missing):
+        for x, k, slope in (requests[number] for number in missing):
             run = self.placed(x)[k].run
             tasks.append((run.simulated, (self.model, self.parameters, x[: self.count], slope)))
         for number, outcome in zip(missing, self.workers.run(tasks), strict=True):
             while len(self._last) >= 3 * (self.count + 2) * len(self.runs):
                 del self._last[next(iter(self._last))]
-            name = self._name(*wanted[number])
-            found[number] = self._last[name] = outcome
+            name = self._name(*requests[number])
+            series[number] = self._last[name] = outcome
             if self.folder is not None:
                 with whole_file(self.folder / f"{name}.bin") as partial:
                     partial.write_bytes(np.ascontiguousarray(outcome).tobytes())
         self.simulations += len(missing)
         if missing:
             self.progress(self.simulations)
-        return [values for values in found if values is not None]
+        return [values for values in series if values is not None]
 
     def _name(self, x: Floats, k: int, slope: bool) -> str:
         text = f"{self._inputs} {x.tolist()!r} {k} {slope}"
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
-    def _kept(self, x: Floats, k: int, slope: bool) -> Floats | None:
+    def _stored(self, x: Floats, k: int, slope: bool) -> Floats | None:
         name = self._name(x, k, slope)
         if name in self._last:
             self._last[name] = self._last.pop(name)  # the last one that is forgotten

@@ -39,19 +39,19 @@ class Form:
 
         Where nothing is measured, the values do not count.
         """
-        known = np.isfinite(prepared.measured) & np.isfinite(values)
-        clean = np.where(known, values, 0.0)
+        valid = np.isfinite(prepared.measured) & np.isfinite(values)
+        clean = np.where(valid, values, 0.0)
         if self.kind == "sections":
-            return self._sections(prepared, clean, known)
+            return self._sections(prepared, clean, valid)
         n = values.shape[1]
         # without the mean, an offset of a sensor: faded and with gaps it would reach into the band
-        count = np.maximum(known.sum(axis=1, keepdims=True), 1)
-        clean = np.where(known, clean - clean.sum(axis=1, keepdims=True) / count, 0.0)
+        count = np.maximum(valid.sum(axis=1, keepdims=True), 1)
+        clean = np.where(valid, clean - clean.sum(axis=1, keepdims=True) / count, 0.0)
         coefficients = np.fft.rfft(clean * _fade(n, prepared.step), axis=1)
         f = np.fft.rfftfreq(n, prepared.step)
         # of white noise of standard deviation 1 in the band each part has the variance 1
-        own = (f >= self.band[0]) & (f <= self.band[1])
-        scaled = coefficients[:, own] * np.sqrt(2.0 / n)
+        in_band = (f >= self.band[0]) & (f <= self.band[1])
+        scaled = coefficients[:, in_band] * np.sqrt(2.0 / n)
         if self.kind == "history":
             return [np.concatenate([row.real, row.imag]) for row in scaled]
         edges = self.band[0] * THIRD ** np.arange(
@@ -60,19 +60,19 @@ class Form:
         rows = []
         noise = 0.0 if measured else np.nan_to_num(prepared.noise * _density(prepared, self.band))
         for row, level in zip(scaled, np.broadcast_to(noise, len(scaled)), strict=True):
-            inside = [row[(f[own] >= a) & (f[own] < a * THIRD)] for a in edges]
+            inside = [row[(f[in_band] >= a) & (f[in_band] < a * THIRD)] for a in edges]
             # both parts of a coefficient have the noise's variance
             power = 2.0 * level**2
             means = [np.mean(np.abs(c) ** 2) + power for c in inside if len(c) >= FEWEST]
             rows.append(0.5 * np.log(np.maximum(means, 1e-300)))
         return rows
 
-    def _sections(self, prepared: Prepared, x: Floats, known: Flags) -> list[Floats]:
-        at = prepared.run.at
-        number = ((at - at[0]) / SECTION).astype(int)
+    def _sections(self, prepared: Prepared, x: Floats, valid: Flags) -> list[Floats]:
+        s = prepared.run.at
+        number = ((s - s[0]) / SECTION).astype(int)
         rows = []
-        for channel, there in zip(x, known, strict=True):
-            count = np.maximum(np.bincount(number, there.astype(float)), 1.0)
+        for channel, present in zip(x, valid, strict=True):
+            count = np.maximum(np.bincount(number, present.astype(float)), 1.0)
             mean = np.bincount(number, channel) / count
             square = np.bincount(number, channel**2) / count
             rows.append(np.concatenate([mean, np.sqrt(np.maximum(square - mean**2, 0.0))]))
@@ -101,13 +101,13 @@ def _fade(n: int, step: float) -> Floats:
 
 def banded(x: Floats, step: float, band: tuple[float, float]) -> Floats:
     """Return a series in a band of frequencies [Hz], both ends faded; NaN where it has no value."""
-    known = np.isfinite(x)
+    valid = np.isfinite(x)
     n = len(x)
-    mean = np.mean(x[known]) if known.any() else 0.0
-    spectrum = np.fft.rfft(np.where(known, x - mean, 0.0) * _fade(n, step))
+    mean = np.mean(x[valid]) if valid.any() else 0.0
+    spectrum = np.fft.rfft(np.where(valid, x - mean, 0.0) * _fade(n, step))
     f = np.fft.rfftfreq(n, step)
     spectrum[(f < band[0]) | (f > band[1])] = 0.0
-    return np.where(known, np.fft.irfft(spectrum, n), np.nan)
+    return np.where(valid, np.fft.irfft(spectrum, n), np.nan)
 
 
 def whiteness(residual: Floats) -> tuple[float, float]:
@@ -130,7 +130,7 @@ def whiteness(residual: Floats) -> tuple[float, float]:
     total = float(power.sum())
     if not total:
         return 0.0, 1.0
-    summed = np.cumsum(power) / total
+    cumulative = np.cumsum(power) / total
     line = np.arange(1, len(power) + 1) / len(power)
-    statistic = float(np.max(np.abs(summed - line)) * np.sqrt(len(power)))
+    statistic = float(np.max(np.abs(cumulative - line)) * np.sqrt(len(power)))
     return statistic, float(kstwobign.sf(statistic))

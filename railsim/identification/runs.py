@@ -75,16 +75,16 @@ class Run:
         """
         from scipy.interpolate import make_interp_spline
 
-        own = self.model(model, parameters, x)
+        varied = self.model(model, parameters, x)
         try:
             with silent():
                 try:
-                    result = self.result(own)
+                    result = self.result(varied)
                 except InputError:
                     if self.settings.step is None:
                         raise
                     # a stiffer variant needs a shorter step than the others
-                    result = replace(self, settings=self.settings.replace(step=None)).result(own)
+                    result = replace(self, settings=self.settings.replace(step=None)).result(varied)
         except ModelError as error:
             raise ModelError(f"{self.name}: {error}") from None
         if result.status != "complete":
@@ -96,8 +96,8 @@ class Run:
         count = len(self.selections)
         values = np.empty((2 * count if slope else count, len(self.at)))
         for k, (name, channel) in enumerate(zip(self.selections, self.amplifiers, strict=True)):
-            x_of = amplified(series(result, name), rate, channel)
-            spline = make_interp_spline(distance[rows], x_of[rows], DEGREE)
+            at_sensor = amplified(series(result, name), rate, channel)
+            spline = make_interp_spline(distance[rows], at_sensor[rows], DEGREE)
             values[k] = spline(self.at)
             if slope:
                 values[count + k] = spline(self.at, 1)
@@ -108,10 +108,10 @@ class Run:
         self, model: Model, parameters: Sequence[Parameter] = (), x: Sequence[float] | Floats = ()
     ) -> Model:
         """Return a model on the track and in the load of the run, at some coordinates."""
-        own = replace(model, track=self.track).with_parameters(parameters, x)
+        variant = replace(model, track=self.track).with_parameters(parameters, x)
         if self.load is None:
-            return own
-        return replace(own, vehicle=own.vehicle.with_values({"load": self.load}))
+            return variant
+        return replace(variant, vehicle=variant.vehicle.with_values({"load": self.load}))
 
     def result(self, model: Model) -> Result:
         """Simulate the run with a model."""
@@ -178,7 +178,7 @@ def track_of(measurement: Measurement) -> Track:
     return load_track(name)
 
 
-def prepared(
+def prepare_run(
     measurement: Measurement, model: Model, band: tuple[float, float], track: Track | None = None
 ) -> Prepared:
     """Return a measured run ready for comparison in a band of frequencies [Hz].
@@ -190,7 +190,7 @@ def prepared(
     """
     track = track or track_of(measurement)
     check_channels(measurement.name, measurement, model.vehicle)
-    measurement = _moving(measurement)
+    measurement = _without_standstill(measurement)
     high = band[1]
     if measurement.rate < 2.5 * high:
         found = f"{measurement.rate:.12g} values per second"
@@ -215,21 +215,21 @@ def prepared(
         allowed = f"{FEWEST} at least: a wider band or a longer run"
         raise input_error(measurement.name, found, allowed, key="band")
     outputs = outputs_for(compared(measurement).values())
-    constant = _constant(thinner)
+    constant = _constant_channels(thinner)
     dead = "does not change where runs are compared: a dead sensor? It is left out."
     measurement = measurement.with_remarks(*(f"{name} {dead}" for name in constant))
     names = tuple(name for name in compared(measurement) if name not in constant)
     channels = tuple(measurement.definition.channels[name] for name in names)
-    how: dict[str, Any] = {"output_rate": OVERSAMPLED * high, "outputs": outputs}
+    settings_values: dict[str, Any] = {"output_rate": OVERSAMPLED * high, "outputs": outputs}
     if steady:
         outputs["low_pass"] = {"frequency": 2.0 * high}
     else:
-        how["output_rate"] = max(VARYING_RATE, FAR_ABOVE * high)
+        settings_values["output_rate"] = max(VARYING_RATE, FAR_ABOVE * high)
         rows = np.stack([measurement.distance, _smooth_speed(measurement)], axis=1)
         rows = rows[:: max(1, round(measurement.rate))]  # one for each second
         rising = np.diff(rows[:, 0], prepend=-np.inf) > 0.1
-        how["drive"] = {"mode": "table", "speed_table": rows[rising].tolist()}
-    settings = Settings.model_validate(how)
+        settings_values["drive"] = {"mode": "table", "speed_table": rows[rising].tolist()}
+    settings = Settings.model_validate(settings_values)
     run = Run(
         measurement.name, track, measurement.definition.load, settings, mean, start,
         min(end + 0.05 * mean, track.length), tuple(c.quantity for c in channels), channels,
@@ -241,28 +241,28 @@ def prepared(
     return Prepared(run, values, names, noise, step, measurement)
 
 
-def _constant(measurement: Measurement) -> list[str]:
+def _constant_channels(measurement: Measurement) -> list[str]:
     """Return the channels without a change; raises InputError: there is no other channel."""
-    known = {name: measurement[name] for name in compared(measurement)}
-    found = [name for name, x in known.items() if rests(x)]
-    if len(found) == len(known):
-        words = "no value where runs are compared"
-        if any(np.isfinite(x).any() for x in known.values()):
-            words = f"{', '.join(found)}: no value that changes where runs are compared"
-        raise input_error(measurement.name, words, "values; 'range', 'missing'?", key="channels")
-    return found
+    channels = {name: measurement[name] for name in compared(measurement)}
+    constant = [name for name, x in channels.items() if rests(x)]
+    if len(constant) == len(channels):
+        found = "no value where runs are compared"
+        if any(np.isfinite(x).any() for x in channels.values()):
+            found = f"{', '.join(constant)}: no value that changes where runs are compared"
+        raise input_error(measurement.name, found, "values; 'range', 'missing'?", key="channels")
+    return constant
 
 
-def _moving(measurement: Measurement) -> Measurement:
+def _without_standstill(measurement: Measurement) -> Measurement:
     """Return a run without standstill at its ends; raises InputError: it stands in between."""
     s = measurement.distance
     slower = np.minimum(measurement.speed, _smooth_speed(measurement))
     moving = s[slower >= SLOWEST]
     part = measurement
     if len(moving) and slower[[0, -1]].min() < SLOWEST:
-        stood = f"Stands before s = {moving[0]:.0f} m or behind {moving[-1]:.0f} m: left out."
+        remark = f"Stands before s = {moving[0]:.0f} m or behind {moving[-1]:.0f} m: left out."
         begin = np.nextafter(moving[0], np.inf)  # its place is that of standstill before it
-        part = measurement.part(begin, moving[-1]).with_remarks(stood)
+        part = measurement.part(begin, moving[-1]).with_remarks(remark)
     v = _smooth_speed(part)
     k = int(np.argmin(v))
     if v[k] < SLOWEST:
@@ -287,5 +287,5 @@ def simulated_run(measurement: Measurement, vehicle: Vehicle | str | Path | None
     """
     model = model_of(vehicle, [measurement])
     check_channels(measurement.name, measurement, model.vehicle)
-    run = prepared(measurement, model, (0.1, min(ALIKE, 0.4 * measurement.rate))).run
+    run = prepare_run(measurement, model, (0.1, min(ALIKE, 0.4 * measurement.rate))).run
     return run.result(run.model(model))

@@ -15,9 +15,9 @@ from railsim.files.access import read_bytes
 from railsim.identification import Identified
 from railsim.identification.identified import (
     AT_BOUND,
-    coloured,
     correlation_table,
     parameter_table,
+    residual_remark,
     residual_table,
 )
 from railsim.plot import validation as plots
@@ -126,7 +126,7 @@ def identification_figures(identified: Identified) -> dict[str, Figure]:
 def identification_part(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
     """Return what a page says about an identification, by its record."""
     unidentified = record["unidentified"]
-    not_white = coloured((one["channel"], one["white"] is not False) for one in record["channels"])
+    not_white = residual_remark((c["channel"], c["white"] is not False) for c in record["channels"])
     bounded = [words for words in record["remarks"] if AT_BOUND in words]
     text = "All parameters are identified; the residuals are white."
     if unidentified:

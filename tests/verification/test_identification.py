@@ -15,12 +15,12 @@ import railsim
 from railsim.cli import railsim as command_line
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.identification import Identified
-from railsim.identification.fit import _at_best_shares, _at_bounds, _covariance, _stretched
-from railsim.identification.identified import Place, coloured
-from railsim.identification.parameters import Model, Parameter, blended, parsed, scaled
+from railsim.identification.fit import _best_shares, _bound_remarks, _covariance, _stretch_remarks
+from railsim.identification.identified import Place, residual_remark
+from railsim.identification.parameters import Model, Parameter, blended, parse_keys, scaled
 from railsim.identification.problem import Problem, Workers
 from railsim.identification.residuals import Form, whiteness
-from railsim.identification.runs import model_of, prepared, simulated_run
+from railsim.identification.runs import model_of, prepare_run, simulated_run
 from railsim.profiles import load_profile
 from railsim.report.measured import identification_part
 
@@ -79,7 +79,7 @@ def measured(folder, vehicle, factors=None, *, seed=1, noise=0.02, stated=True, 
              load=None, drive=None, hum=0.0):  # fmt: skip
     """Write a measured run of a vehicle with some parameters off; hum of 9 Hz on its body."""
     factors = factors or {}
-    keys = parsed(factors, vehicle, TRACK) if factors else []
+    keys = parse_keys(factors, vehicle, TRACK) if factors else []
     true = Model(vehicle, TRACK).with_parameters(keys, np.log(list(factors.values())))
     low_pass = {"frequency": 60.0}
     outputs = {"sensors": "readings", "quantities": ["distance"], "low_pass": low_pass}
@@ -208,19 +208,19 @@ def test_standstill_at_the_ends_is_left_out_and_in_between_refused(tmp_path):
     assert result.status == "complete"
     assert result.distance[-1] == pytest.approx(own.distance[-1], abs=0.1 * SPEED)
     model = model_of(quarter(), [ends])
-    said = prepared(ends, model, (0.5, 14.0)).measurement.remarks
+    said = prepare_run(ends, model, (0.5, 14.0)).measurement.remarks
     assert [words for words in said if words.startswith("Stands before s = ")]
     for begin, rest in ((600, 0), (0, 600)):  # at one end only
         own = slice(600 - begin, len(rows) - 600 + rest)
         one = standing(rows[own], ((still < 600) | (still >= len(rows) - 600))[own])
-        kept = prepared(one, model, (0.5, 14.0)).measurement
+        kept = prepare_run(one, model, (0.5, 14.0)).measurement
         assert len(kept.remarks) == 1
         assert kept.speed.min() > 0.9 * SPEED
         assert len(kept.time) == pytest.approx(len(run.time), abs=run.rate)
     middle = np.r_[np.arange(700), np.full(600, 700), np.arange(700, len(run.time))]
     stop = standing(middle, (still[: len(middle)] >= 700) & (still[: len(middle)] < 1300))
     with pytest.raises(railsim.InputError, match="run: speed: 0 m/s at s = 70 m; 1 m/s at least"):
-        prepared(stop, model, (0.5, 14.0))
+        prepare_run(stop, model, (0.5, 14.0))
 
 
 @pytest.mark.further
@@ -260,7 +260,7 @@ def in_series():
 
 def test_bounds_and_spread_of_a_parameter_stand_behind_its_key():
     """Factors below and above 1, and the share to which it is known; a key alone has no spread."""
-    alone, bounded, known = parsed(
+    alone, bounded, known = parse_keys(
         [PRIMARY, f"{MASS}:0.7:1.2", f"{DAMPER}:0.5:2:0.2"], quarter(), TRACK
     )
     assert alone.spread is bounded.spread is None
@@ -272,7 +272,7 @@ def test_a_combination_that_nothing_shows_is_said_in_words():
     """Two springs in series: k = k1 k2/(k1 + k2), d ln k = (k2 d ln k1 + k1 d ln k2)/(k1 + k2)."""
     vehicle = in_series()
     names = ["lower.stiffness.z", "upper.stiffness.z"]
-    parameters = parsed(names, vehicle, TRACK)
+    parameters = parse_keys(names, vehicle, TRACK)
     row = np.array([[1.0, 3.0]]) / 4.0  # k1 = 3 k2
     _, singular, vectors = np.linalg.svd(np.vstack([1e3 * row, [[1e-9, 0.0]]]))
     one = Identified(vehicle, tuple(parameters), np.zeros(2), np.eye(2), singular, vectors, ())
@@ -286,7 +286,7 @@ def test_a_combination_that_nothing_shows_is_said_in_words():
 def test_what_is_known_to_less_than_half_is_unknown(spread, said):
     """A parameter of singular value s is known to 1/s, and to 50 % at least or not at all."""
     vehicle = in_series()
-    parameters = parsed(["lower.stiffness.z"], vehicle, TRACK)
+    parameters = parse_keys(["lower.stiffness.z"], vehicle, TRACK)
     singular, vectors = np.array([1.0 / spread]), np.eye(1)
     one = Identified(vehicle, tuple(parameters), np.zeros(1), np.eye(1), singular, vectors, ())
     assert len(one.unidentified) == len(said)
@@ -332,9 +332,11 @@ def test_a_model_that_lacks_a_damper_leaves_residuals_that_are_not_white(tmp_pat
 
 
 def test_what_is_said_of_residuals_that_are_not_white():
-    assert coloured([("Q", True), ("Y", True)]) == ""
-    assert coloured([("Q", True), ("Y", False), ("Y", False)]).startswith("The residuals of Y are")
-    assert "not to be believed" in coloured([("Q", False), ("Y", False)])
+    assert residual_remark([("Q", True), ("Y", True)]) == ""
+    assert residual_remark([("Q", True), ("Y", False), ("Y", False)]).startswith(
+        "The residuals of Y are"
+    )
+    assert "not to be believed" in residual_remark([("Q", False), ("Y", False)])
 
 
 def test_whiteness_has_its_own_level():
@@ -350,8 +352,8 @@ def test_friction_beside_its_table_is_no_parameter():
     wet = TRACK.replace(friction=0.3, friction_table=[[0.0, 0.1], [500.0, 0.4]])
     vehicle = railsim.load_vehicle("coach_25t")
     with pytest.raises(railsim.InputError, match="friction_table"):
-        parsed(["track.friction"], vehicle, wet)
-    assert parsed(["track.friction_table"], vehicle, wet)
+        parse_keys(["track.friction"], vehicle, wet)
+    assert parse_keys(["track.friction_table"], vehicle, wet)
     assert any(remark.key == "friction" for remark in wet.unusual())
     assert not any(remark.key == "friction" for remark in TRACK.replace(friction=0.3).unusual())
 
@@ -361,7 +363,9 @@ def test_tables_scale_their_forces_only():
     # friction of both rails
     assert scaled([[0.0, 0.3, 0.4], [9.0, 0.1, 0.2]], 2.0) == [[0.0, 0.6, 0.8], [9.0, 0.2, 0.4]]
     one = Model(railsim.load_vehicle("coach_25t"), TRACK)
-    keys = parsed(["primary_vertical_damper.damper_table", "track.friction"], one.vehicle, TRACK)
+    keys = parse_keys(
+        ["primary_vertical_damper.damper_table", "track.friction"], one.vehicle, TRACK
+    )
     both = one.with_parameters(keys, np.log([0.5, 0.5]))
     axle = both.vehicle.assemblies["bogie"].assemblies["axle"]
     assert axle.elements["primary_vertical_damper"].damper_table[1] == (0.3, 1300.0)
@@ -420,7 +424,7 @@ def test_bounds_are_said_where_a_parameter_ends_at_one():
         ([np.log(0.5), 0.0], ["damping ends at its bound of 0.5"]),
         ([np.log(2.0), 0.8], ["damping ends at its bound of 2", "wear ends at its bound of 0.8"]),
     ):
-        found = [words.partition(":")[0] for words in _at_bounds([factor, share], np.array(x))]
+        found = [words.partition(":")[0] for words in _bound_remarks([factor, share], np.array(x))]
         assert found == said
 
 
@@ -460,7 +464,7 @@ def test_an_offset_of_a_sensor_is_outside_the_band(found):
     shifted.write_text(path.read_text().replace("run.csv", "offset.csv"))
     both = [railsim.load_measurement(file) for file in (path, shifted)]
     model, band = model_of(one.fitted, both, TRACK), (0.5, 14.0)
-    ready = [prepared(run, model, band, TRACK) for run in both]
+    ready = [prepare_run(run, model, band, TRACK) for run in both]
     same, other = (Form("history", band).features(run, run.measured) for run in ready)
     np.testing.assert_allclose(other, same, atol=1e-6 * np.max(np.abs(same)))
     assert np.ptp([run.measured[-2:].mean(axis=1) for run in ready], axis=0).max() > 4.0
@@ -487,8 +491,8 @@ def test_a_channel_that_a_robust_loss_leaves_out_does_not_widen_the_intervals(fo
 def test_all_variants_have_the_step_of_the_model(found):
     measurement = railsim.load_measurement(found[1])
     model = model_of(quarter(), [measurement], TRACK)
-    run = prepared(measurement, model, (0.5, 14.0), TRACK).run.with_step_of(model)
-    softer = run.model(model, parsed([PRIMARY], quarter(), TRACK), [-0.5])
+    run = prepare_run(measurement, model, (0.5, 14.0), TRACK).run.with_step_of(model)
+    softer = run.model(model, parse_keys([PRIMARY], quarter(), TRACK), [-0.5])
     assert run.result(softer).attributes["step"] == run.settings.step
 
 
@@ -572,7 +576,7 @@ def test_eight_parameters_of_a_coach(tmp_path):
         "cant=[]",
     ])  # fmt: skip
     vehicle = railsim.load_vehicle("coach_25t")
-    true = Model(vehicle, track).with_parameters(parsed(keys, vehicle, track),
+    true = Model(vehicle, track).with_parameters(parse_keys(keys, vehicle, track),
                                                  np.log(list(keys.values())))  # fmt: skip
     outputs = {"low_pass": {"frequency": 150.0}, "sensors": "readings", "quantities": ["distance"]}
     settings = railsim.Settings.model_validate({"output_rate": 500.0, "outputs": outputs})
@@ -613,7 +617,7 @@ def test_friction_of_a_curve_is_found_beside_a_stiffness(tmp_path):
     keys = {"track.friction": 0.75, "primary.stiffness.x": 1.3}
     vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
     true = Model(vehicle, track).with_parameters(
-        parsed(keys, vehicle, track), np.log(list(keys.values()))
+        parse_keys(keys, vehicle, track), np.log(list(keys.values()))
     )
     outputs = {"quantities": ["distance", "Q", "Y"], "low_pass": {"frequency": 20.0}}
     settings = railsim.Settings.model_validate({"output_rate": 200.0, "outputs": outputs})
@@ -662,7 +666,7 @@ def test_a_stretched_arc_length_is_said(found, tmp_path):
 def test_a_stretch_that_the_noise_explains_is_not_said():
     """-1.21 m/km with a standard deviation of 0.58 m/km, from a band with nothing but noise."""
     places = [Place("a", 0.2, -1.21e-3), Place("b", 0.0, -1.21e-3), Place("c", 0.0, 9e-4)]
-    (said,) = _stretched(places, np.array([0.58e-3, 0.05e-3, 1e-6]))
+    (said,) = _stretch_remarks(places, np.array([0.58e-3, 0.05e-3, 1e-6]))
     assert said.startswith("b: its arc length is stretched by -1.21 m/km")
 
 
@@ -675,7 +679,7 @@ def test_a_share_of_profiles_begins_in_the_deepest_of_several_valleys():
         def vectors(self, points):
             return [np.array([(x[1] - 0.2) * (x[1] - 0.7), 0.1 * (x[1] - 0.7)]) for x in points]
 
-    assert _at_best_shares(Valleys(), np.zeros(2)).tolist() == [0.0, 0.75]
+    assert _best_shares(Valleys(), np.zeros(2)).tolist() == [0.0, 0.75]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
@@ -691,11 +695,11 @@ def test_spectra_are_compared_in_third_octaves():
     """From the lower end of the band on: 1, 1.26, 1.59, 2 Hz and so on, three to an octave."""
     n, step = 20_000, 0.01
     t = step * np.arange(n)
-    prepared = SimpleNamespace(measured=np.zeros((1, n)), step=step, noise=np.zeros(1))
+    prepare_run = SimpleNamespace(measured=np.zeros((1, n)), step=step, noise=np.zeros(1))
     form = Form("spectra", (1.0, 16.0))
     for band, f in enumerate(2.0 ** ((np.arange(12) + 0.5) / 3.0)):
         for aside in (2.0**-0.13, 2.0**0.13):
-            (rows,) = form.features(prepared, np.sin(2.0 * np.pi * f * aside * t)[None])
+            (rows,) = form.features(prepare_run, np.sin(2.0 * np.pi * f * aside * t)[None])
             assert np.argmax(rows) == band
 
 
@@ -706,9 +710,9 @@ def test_a_dead_sensor_is_left_out_and_dead_sensors_alone_are_refused(tmp_path):
     model = model_of(vehicle, [run])
     dead = {name: np.full_like(x, 0.3) for name, x in run.channels.items()}
     for band in ((0.5, 14.0), (1.0, 3.0)):
-        whole = prepared(run, model, band)
+        whole = prepare_run(run, model, band)
         spoilt = {**run.channels, "on_body": dead["on_body"]}
-        one = prepared(replace(run, channels=spoilt), model, band)
+        one = prepare_run(replace(run, channels=spoilt), model, band)
         assert one.names == ("on_frame", "axlebox_1_left")
         assert one.measured == pytest.approx(whole.measured[[0, 2]], rel=1e-12)
         (said,) = one.measurement.remarks
@@ -716,7 +720,7 @@ def test_a_dead_sensor_is_left_out_and_dead_sensors_alone_are_refused(tmp_path):
         assert one.run.settings == whole.run.settings  # simulated with all channels
         words = "run: channels: on_frame, on_body, axlebox_1_left: no value that changes"
         with pytest.raises(railsim.InputError, match=words):
-            prepared(replace(run, channels=dead), model, band)
+            prepare_run(replace(run, channels=dead), model, band)
 
 
 def test_a_run_is_prepared_with_its_lead_its_speeds_and_the_noise_in_the_band(tmp_path):
@@ -729,25 +733,25 @@ def test_a_run_is_prepared_with_its_lead_its_speeds_and_the_noise_in_the_band(tm
     long = TRACK.replace(plan=[{"type": "STR", "length": 500.0}])
     model = model_of(vehicle, [run], long)
     for band in ((0.5, 14.0), (1.0, 3.0)):  # the second one at fewer values than are measured
-        one = prepared(run, model, band, long)
+        one = prepare_run(run, model, band, long)
         stated = [run.definition.channels[name].noise for name in one.names]
         share = np.sqrt(2.0 * (band[1] - band[0]) / RATE)
         assert one.noise == pytest.approx(share * np.array(stated), rel=1e-6)
     none = replace(run, channels={name: np.nan * x for name, x in run.channels.items()})
     with pytest.raises(railsim.InputError, match="channels: no value where runs are compared"):
-        prepared(none, model, (0.5, 14.0), long)  # a vehicle "identified" by nothing was written
+        prepare_run(none, model, (0.5, 14.0), long)  # a vehicle "identified" by nothing was written
     for seconds in (1.0, 2.5):  # over before anything counts, or soon after
         with pytest.raises(railsim.InputError, match="2 s after the start of the run"):
-            prepared(run.part(0.0, seconds * SPEED), model, (0.5, 14.0), long)
+            prepare_run(run.part(0.0, seconds * SPEED), model, (0.5, 14.0), long)
     for shift, start in ((40.0, 0.0), (150.0, 50.0)):
-        one = prepared(run.moved(shift), model, (0.5, 14.0), long).run
+        one = prepare_run(run.moved(shift), model, (0.5, 14.0), long).run
         first = shift + run.distance[0]
         assert one.start == pytest.approx(start + run.distance[0] * (start > 0.0))
         assert one.at[0] == pytest.approx(max(first, one.start + 2.0 * SPEED), abs=0.2)
-    prepared(run.part(50.0, 50.0 + 4.02 * SPEED).moved(150.0), model, (0.5, 14.0), long)
+    prepare_run(run.part(50.0, 50.0 + 4.02 * SPEED).moved(150.0), model, (0.5, 14.0), long)
     with pytest.raises(railsim.InputError, match=r"distance: 79 m .* 80 m at least"):  # 4 s
-        prepared(run.part(50.0, 50.0 + 3.97 * SPEED).moved(150.0), model, (0.5, 14.0), long)
+        prepare_run(run.part(50.0, 50.0 + 3.97 * SPEED).moved(150.0), model, (0.5, 14.0), long)
     for wave, mode in ((0.009, "constant"), (0.011, "table")):  # from the least to the largest
         speed = SPEED * (1.0 + 0.5 * wave * np.cos(2.0 * np.pi * np.arange(len(run.time)) / 400.0))
-        drive = prepared(replace(run, speed=speed), model, (0.5, 14.0), long).run.settings.drive
+        drive = prepare_run(replace(run, speed=speed), model, (0.5, 14.0), long).run.settings.drive
         assert drive.mode == mode

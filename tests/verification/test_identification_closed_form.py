@@ -15,7 +15,7 @@ from selection import points
 
 import railsim
 from railsim.identification.derivatives import Derivative, Sensitivity, _central, _forward
-from railsim.identification.fit import _counting, _solved
+from railsim.identification.fit import _counting, _solve
 from railsim.identification.identified import Channel
 from railsim.identification.parameters import Parameter
 from railsim.identification.problem import Problem, Workers
@@ -84,7 +84,7 @@ def identified(ready, parameters, place=True, loss="linear"):
     model = SimpleNamespace(vehicle=FILE)
     form = Form("history", BAND)
     problem = Problem(model, parameters, ready, form, place, Workers(1), None, lambda n: None)
-    return _solved(problem, loss)
+    return _solve(problem, loss)
 
 
 def projection():
@@ -323,7 +323,7 @@ def test_runs_of_the_first_search_by_a_part_count_with_the_others(monkeypatch):
     form, parameters = Form("history", BAND), [Parameter(name, (name,)) for name in TRUE]
     model = SimpleNamespace(vehicle=FILE)
     problem = Problem(model, parameters, ready, form, False, Workers(1), None, told.append)
-    found = _solved(problem, "linear")
+    found = _solve(problem, "linear")
     assert set(calls) == {800, 2600}
     assert found.simulations == told[-1] == len(calls)
     assert told == sorted(told)

@@ -9,7 +9,7 @@ from test_fixed_bodies import hanging, rig
 
 import railsim
 from railsim.definitions.settings import Settings
-from railsim.identification.derivatives import _central, _one
+from railsim.identification.derivatives import _central, _central_derivative
 
 pytestmark = pytest.mark.usefixtures("small_contact_tables_in_module")  # the anchor is fixed
 STRAIGHT = load_track("straight")
@@ -139,11 +139,11 @@ def test_sides_of_a_parabola_differ_by_its_curvature(slope, curvature, share):
     """
     h = 0.01
     above, below = (np.full(3, slope * x + curvature * x**2) for x in (h, -h))
-    found, ratio = _one(np.zeros(3), above, below, h, None)
+    found, ratio = _central_derivative(np.zeros(3), above, below, h, None)
     assert found.value == pytest.approx(slope)
     assert ratio == pytest.approx(share)
     assert found.error == pytest.approx(share**2 if share < 0.1 else max(share, share**2))
-    other, _ = _one(np.zeros(3), 1.05 * above, 1.05 * below, h, found)
+    other, _ = _central_derivative(np.zeros(3), 1.05 * above, 1.05 * below, h, found)
     if share < 0.1:  # a second step says what it differs by: 0.05 of 1.05
         assert other.error == pytest.approx(0.05 / 1.05)
 
@@ -152,7 +152,7 @@ def test_sides_of_a_parabola_differ_by_its_curvature(slope, curvature, share):
 def test_sides_that_differ_by_a_fifth_of_the_largest_derivative_are_a_kink(kink, kinked):
     """x + k |x| beside x."""
     above, below = (np.array([x, x + kink * abs(x)]) for x in (0.01, -0.01))
-    found, _ = _one(np.zeros(2), above, below, 0.01, None)
+    found, _ = _central_derivative(np.zeros(2), above, below, 0.01, None)
     assert found.value == pytest.approx(1.0)
     assert found.kinked == kinked
 
