@@ -53,13 +53,13 @@ def common_shift(signals: Iterable[tuple[Floats, Floats, Floats, Floats]]) -> Sh
     not move the others. Returns: None where no signal has one shift in half of its windows, or the
     others do not share it.
     """
-    every = [shift_of(*signal) for signal in signals]
-    found = [one for one in every if one is not None and one.share >= AGREEING]
-    best = max((one.correlation for one in found), default=0.0)
-    alike = sorted((s for s in found if s.correlation >= best - AS_ALIKE), key=lambda s: s.shift)
+    shifts = [shift_of(*signal) for signal in signals]
+    agreeing = [one for one in shifts if one is not None and one.share >= AGREEING]
+    best = max((one.correlation for one in agreeing), default=0.0)
+    alike = sorted((s for s in agreeing if s.correlation >= best - AS_ALIKE), key=lambda s: s.shift)
     middle = alike[len(alike) // 2] if alike else None
-    near = [one for one in found if middle is not None and abs(one.shift - middle.shift) < NEAR]
-    return middle if len(near) >= TOGETHER * len(every) else None
+    near = [one for one in agreeing if middle is not None and abs(one.shift - middle.shift) < NEAR]
+    return middle if len(near) >= TOGETHER * len(shifts) else None
 
 
 def shift_of(
@@ -71,8 +71,8 @@ def shift_of(
     `reference` (float64[m]): signal at the right place; `most`: largest shift that is looked for
     [m]. Returns: None where no window of the signals is alike.
     """
-    known = np.isfinite(x)
-    if known.sum() < 10:
+    valid = np.isfinite(x)
+    if valid.sum() < 10:
         return None
     low, high = max(s[0], s_reference[0]), min(s[-1], s_reference[-1])
     length = min(WINDOW, (high - low) / 2.0)
@@ -80,7 +80,7 @@ def shift_of(
         return None
     most = min(most, 0.4 * length)
     grid = np.arange(low, high, STEP)
-    a, b = np.interp(grid, s[known], x[known]), np.interp(grid, s_reference, reference)
+    a, b = np.interp(grid, s[valid], x[valid]), np.interp(grid, s_reference, reference)
     size, reach = int(length / STEP), int(most / STEP)
     clear = []  # middle, shift and correlation of windows
     begins = range(reach, len(grid) - size - reach + 1, max(1, size // 2))
@@ -103,11 +103,11 @@ def shift_of(
 
 def _lag(a: Floats, b: Floats) -> tuple[float, float]:
     """Place of a within the longer b in grid points, and the correlation there."""
-    own, b, ones = a - a.mean(), b - b.mean(), np.ones(len(a))
+    centred, b, ones = a - a.mean(), b - b.mean(), np.ones(len(a))
     energy = np.correlate(b**2, ones) - np.correlate(b, ones) ** 2 / len(a)
-    scale = np.sqrt(np.maximum(energy, 0.0) * np.sum(own**2))
+    scale = np.sqrt(np.maximum(energy, 0.0) * np.sum(centred**2))
     # where b is constant, rounding is no likeness
-    values = np.correlate(b, own) / np.where(scale > 1e-6 * scale.max(), scale, np.inf)
+    values = np.correlate(b, centred) / np.where(scale > 1e-6 * scale.max(), scale, np.inf)
     k = int(np.argmax(values))
     offset = 0.0
     if 0 < k < len(values) - 1:
@@ -131,47 +131,47 @@ def aligned(
     """
     s = measurement.distance
     grid = np.arange(s[0] - most, s[-1] + most, STEP)
-    by = next((name for name in CURVATURES if name in measurement), None)
-    if by is not None:
-        x = measurement[by]
-        x = x / np.maximum(measurement.speed, 1.0) if by == "yaw_rate" else x
-        reference, at = Alignment(track).curvature(grid), s
-        words = "curvature"
+    channel = next((name for name in CURVATURES if name in measurement), None)
+    if channel is not None:
+        x = measurement[channel]
+        x = x / np.maximum(measurement.speed, 1.0) if channel == "yaw_rate" else x
+        reference, places = Alignment(track).curvature(grid), s
+        basis = "curvature"
     else:
         boxes = fnmatch.filter(measurement.quantities.values(), "sensor_acceleration:axlebox_1*:z")
-        box, moved = next(iter(boxes), None), displacement(track)
-        if box is None or moved is None:
+        box, displacement_of = next(iter(boxes), None), displacement(track)
+        if box is None or displacement_of is None:
             allowed = (
                 "a channel of curvature, yaw_rate or axlebox_1's vertical acceleration with "
                 "irregularities"
             )
             raise argument_error("track", "nothing to align by", allowed)
-        level = moved(grid)[0][[1, 3]].mean(axis=0)
+        level = displacement_of(grid)[0][[1, 3]].mean(axis=0)
         reference = np.gradient(np.gradient(level, STEP), STEP)
-        named = vehicle or measurement.definition.vehicle
-        if named is None:
+        source = vehicle or measurement.definition.vehicle
+        if source is None:
             allowed = "give it, or the key 'vehicle' of the measurement"
             raise argument_error("vehicle", "none", allowed)
-        carrying = named if isinstance(named, Vehicle) else load_vehicle(named)
-        at = s + all_sensors(carrying)[box.split(":")[1]].along
+        carrier = source if isinstance(source, Vehicle) else load_vehicle(source)
+        places = s + all_sensors(carrier)[box.split(":")[1]].along
         x = measurement[box] / np.maximum(measurement.speed, 1.0) ** 2
         step = float(np.mean(np.diff(s)))
-        known = np.isfinite(x)
-        x = np.interp(s, s[known], x[known])
+        valid = np.isfinite(x)
+        x = np.interp(s, s[valid], x[valid])
         x = band_passed(x, 1.0 / step, 1.0 / WAVES[1], 1.0 / WAVES[0])
         reference = band_passed(reference, 1.0 / STEP, 1.0 / WAVES[1], 1.0 / WAVES[0])
-        words = "level of the rails"
-    found = shift_of(at, x, grid, reference, most=most)
-    if found is None:
+        basis = "level of the rails"
+    shift = shift_of(places, x, grid, reference, most=most)
+    if shift is None:
         allowed = f"a place known within {most:g} m; the right track; signs and units"
-        raise argument_error("track", f"the {words} matches nowhere", allowed)
-    apart = found.windows - found.near
-    if found.near < AGREEING * found.windows:
-        words = f"{apart} of {found.windows} windows of the {words} are not at one shift and drift"
-        raise argument_error("measurement", words, "a counter that does not jump; the right track")
-    jumps = f" {apart} of them lie elsewhere: does the counter jump?" if apart else ""
-    return measurement.moved(found.shift, found.stretch).with_remarks(
-        f"Aligned by the {words}: {found.shift:+.2f} m at the beginning, "
-        f"{1e3 * found.stretch:+.2f} m/km (correlation {found.correlation:.2f} in "
-        f"{found.windows} windows).{jumps}"
+        raise argument_error("track", f"the {basis} matches nowhere", allowed)
+    astray = shift.windows - shift.near
+    if shift.near < AGREEING * shift.windows:
+        found = f"{astray} of {shift.windows} windows of the {basis} are not at one shift and drift"
+        raise argument_error("measurement", found, "a counter that does not jump; the right track")
+    jumps = f" {astray} of them lie elsewhere: does the counter jump?" if astray else ""
+    return measurement.moved(shift.shift, shift.stretch).with_remarks(
+        f"Aligned by the {basis}: {shift.shift:+.2f} m at the beginning, "
+        f"{1e3 * shift.stretch:+.2f} m/km (correlation {shift.correlation:.2f} in "
+        f"{shift.windows} windows).{jumps}"
     )

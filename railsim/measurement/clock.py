@@ -35,86 +35,86 @@ class Clock:
         if self.places is not None:
             if len(self.places) == len(self.time):
                 return x
-            found = np.full(len(self.time), np.nan)
-            found[self.places] = x
-            return found
-        known = np.isfinite(x)
-        if known.sum() < 2:
+            values = np.full(len(self.time), np.nan)
+            values[self.places] = x
+            return values
+        valid = np.isfinite(x)
+        if valid.sum() < 2:
             return np.full(len(self.time), np.nan)
-        t = self.written[known]
-        found = np.interp(self.time, t, x[known], np.nan, np.nan)
+        t = self.written[valid]
+        values = np.interp(self.time, t, x[valid], np.nan, np.nan)
         after = np.clip(np.searchsorted(t, self.time), 1, len(t) - 1)
-        found[t[after] - t[after - 1] > 2.0 * JUMP / self.rate] = np.nan
-        return found
+        values[t[after] - t[after - 1] > 2.0 * JUMP / self.rate] = np.nan
+        return values
 
 
-def clock_of(file: str, written: Floats) -> Clock:
+def clock_of(file: str, times: Floats) -> Clock:
     """Return the clock of a record from the times that it holds [s].
 
     Raises InputError: a time that is missing or does not rise; gaps much longer than the record.
     """
-    steps = np.diff(written)
+    steps = np.diff(times)
     wrong = np.flatnonzero(~(steps > 0.0))
-    if not np.isfinite(written).all() or len(wrong):
+    if not np.isfinite(times).all() or len(wrong):
         row = int(wrong[0]) + 2 if len(wrong) else 1
-        found = f"time {written[row - 1]:g} s of value {row} does not rise"
+        found = f"time {times[row - 1]:g} s of value {row} does not rise"
         raise input_error(file, found, "times that rise from value to value", key="time")
-    count = np.arange(len(written))
-    slope, first = np.polyfit(count - count.mean(), written - written.mean(), 1)
-    line = written.mean() + first + slope * (count - count.mean())
+    count = np.arange(len(times))
+    slope, first = np.polyfit(count - count.mean(), times - times.mean(), 1)
+    line = times.mean() + first + slope * (count - count.mean())
     digits = steps / steps.min()
     if (
         digits.max() < 2.5
         and (digits > JUMP).sum() > max(2.0, FEWEST_LONG * len(steps))
         and np.abs(digits - np.round(digits)).max() < 0.01
-        and np.abs(written - line).max() < 0.5 * slope  # a value that is lost leaves it by more
+        and np.abs(times - line).max() < 0.5 * slope  # a value that is lost leaves it by more
     ):
-        return Clock(line, 1.0 / float(slope), count, written)
+        return Clock(line, 1.0 / float(slope), count, times)
     median = float(np.median(steps))
     ends = np.flatnonzero(steps > JUMP * median)
     step = float(steps[steps <= JUMP * median].mean())
-    span = float(written[-1] - written[0])
-    if span / step > MOST_LOST * len(written):
+    span = float(times[-1] - times[0])
+    if span / step > MOST_LOST * len(times):
         found = f"a gap of {steps.max():g} s"
         raise input_error(file, found, "a record in one piece, or two files", key="time")
-    places, begin = np.zeros(len(written), dtype=np.int64), 0
+    places, begin = np.zeros(len(times), dtype=np.int64), 0
     off = 0.0
-    for end in [*ends.tolist(), len(written) - 1]:
-        own = written[begin : end + 1]
-        count = np.arange(len(own))
-        offset = float(np.mean(own - count * step))
-        first = round((offset - written[0]) / step)
+    for end in [*ends.tolist(), len(times) - 1]:
+        piece = times[begin : end + 1]
+        count = np.arange(len(piece))
+        offset = float(np.mean(piece - count * step))
+        first = round((offset - times[0]) / step)
         places[begin : end + 1] = first + count
-        off = max(off, float(np.abs(own - written[0] - (first + count) * step).max()))
+        off = max(off, float(np.abs(piece - times[0] - (first + count) * step).max()))
         begin = end + 1
     rising = bool((np.diff(places) > 0).all())
     remarks = []
     if len(ends):
         remarks.append(f"The record has {len(ends)} gaps, together {steps[ends].sum():.3g} s.")
     if rising and off < (ROUNDED + 0.5 * bool(len(ends))) * step:
-        time = written[0] + step * np.arange(places[-1] - places[0] + 1)
-        return Clock(time, 1.0 / step, places - places[0], written, tuple(remarks))
+        time = times[0] + step * np.arange(places[-1] - places[0] + 1)
+        return Clock(time, 1.0 / step, places - places[0], times, tuple(remarks))
     remarks.append(
         f"The time steps are unequal ({steps.min():.3g} to {steps.max():.3g} s); the channels "
         f"are interpolated to {1.0 / median:.6g} values per second."
     )
-    time = written[0] + median * np.arange(int(span / median + 1e-6) + 1)
-    return Clock(time, 1.0 / median, None, written, tuple(remarks))
+    time = times[0] + median * np.arange(int(span / median + 1e-6) + 1)
+    return Clock(time, 1.0 / median, None, times, tuple(remarks))
 
 
-def joined(parts: list[Floats]) -> tuple[Floats, int]:
+def joined_times(parts: list[Floats]) -> tuple[Floats, int]:
     """Return the times of several files as one record, and how many files begin their clock anew.
 
     A file whose clock does not continue that of the one before follows it after one step.
     """
-    found, anew = parts[0], 0
+    times, restarts = parts[0], 0
     for part in parts[1:]:
-        if len(part) and len(found) and part[0] <= found[-1]:
+        if len(part) and len(times) and part[0] <= times[-1]:
             step = float(np.median(np.diff(part))) if len(part) > 1 else 0.0
-            part = part - part[0] + found[-1] + step
-            anew += 1
-        found = np.concatenate([found, part])
-    return found, anew
+            part = part - part[0] + times[-1] + step
+            restarts += 1
+        times = np.concatenate([times, part])
+    return times, restarts
 
 
 def delayed(x: Floats, steps: float) -> Floats:
@@ -135,21 +135,21 @@ def delayed(x: Floats, steps: float) -> Floats:
     }
     if f == 0.0:
         weights = {0: 1.0}
-    found = np.zeros(len(x))
+    values = np.zeros(len(x))
     for k, weight in weights.items():
-        at = np.arange(len(x)) + whole + k
-        found += weight * np.where((at >= 0) & (at < len(x)), x.take(at, mode="clip"), np.nan)
-    return found
+        row = np.arange(len(x)) + whole + k
+        values += weight * np.where((row >= 0) & (row < len(x)), x.take(row, mode="clip"), np.nan)
+    return values
 
 
 def bridged(x: Floats, longest: int) -> Floats:
     """Return values with gaps of up to `longest` values filled by straight lines."""
-    unknown = np.isnan(x)
-    if not longest or not unknown.any() or unknown.all():
+    missing = np.isnan(x)
+    if not longest or not missing.any() or missing.all():
         return x
-    found = x.copy()
-    for begin, end in stretches(unknown):
+    filled = x.copy()
+    for begin, end in stretches(missing):
         if begin > 0 and end < len(x) and end - begin <= longest:
             t = np.arange(1, end - begin + 1) / (end - begin + 1)
-            found[begin:end] = x[begin - 1] + t * (x[end] - x[begin - 1])
-    return found
+            filled[begin:end] = x[begin - 1] + t * (x[end] - x[begin - 1])
+    return filled

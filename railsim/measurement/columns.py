@@ -18,7 +18,7 @@ from railsim.definitions.measurement import MeasurementFile
 from railsim.errors import Fault, Faults, InputError, input_error, nearest, optional_package
 from railsim.files.access import open_regular
 
-Wanted = Mapping[str, tuple[str, tuple[int, ...]]]
+Columns = Mapping[str, tuple[str, tuple[int, ...]]]
 """Name of the column in the file, and index beyond time, by our names."""
 Piece = dict[str, Floats]
 ROWS = 50_000
@@ -27,7 +27,7 @@ NUMERIC = {"double", "single", "logical"} | {
 }
 
 
-def pieces(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
+def pieces(path: Path, columns: Columns, setup: MeasurementFile) -> Iterator[Piece]:
     """Yield pieces of the columns of a file, one behind the other.
 
     Raises InputError: no such file or column; not what its ending says; something else than
@@ -38,47 +38,47 @@ def pieces(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
         found = f"the name ends in '{path.suffix}'"
         raise input_error(path, found, "one of " + ", ".join(_READERS))
     open_regular(path).close()
-    if path.suffix.lower() in (".csv", ".txt") and any(index for _, index in wanted.values()):
+    if path.suffix.lower() in (".csv", ".txt") and any(index for _, index in columns.values()):
         raise input_error(path, "a table with 'index'", "leave 'index' out")
-    yield from reader(path, wanted, how)
+    yield from reader(path, columns, setup)
 
 
 def _unreadable(path: Path, kind: str, error: Exception, allowed: str = "") -> InputError:
-    words = str(error).partition("\n")[0][:100]
-    return input_error(path, f"cannot be read as {kind} ({words})", allowed)
+    message = str(error).partition("\n")[0][:100]
+    return input_error(path, f"cannot be read as {kind} ({message})", allowed)
 
 
-def _named(path: Path, wanted: Wanted, known: Sequence[str]) -> None:
+def _check_columns(path: Path, columns: Columns, names: Sequence[str]) -> None:
     """Refuse columns that the file does not have, all at once."""
     Faults(
-        Fault(str(path), "columns", f"no column '{name}'", nearest(name, known))
-        for name in dict.fromkeys(theirs for theirs, _ in wanted.values())
-        if name not in known
+        Fault(str(path), "columns", f"no column '{name}'", nearest(name, names))
+        for name in dict.fromkeys(column for column, _ in columns.values())
+        if name not in names
     ).check()
 
 
-def _csv(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
+def _csv(path: Path, columns: Columns, setup: MeasurementFile) -> Iterator[Piece]:
     try:
-        with io.TextIOWrapper(open_regular(path), encoding=how.encoding) as text:
-            lines = _lines(text, how.skip)
+        with io.TextIOWrapper(open_regular(path), encoding=setup.encoding) as text:
+            lines = _lines(text, setup.skip)
             _, head = next(lines, (0, ""))
             if not head:
                 raise input_error(path, "empty", "names of columns and rows of numbers")
             delimiter = next((d for d in (";", "\t") if d in head), ",")
             names = [cell.strip().strip('"') for cell in head.split(delimiter)]
-            _named(path, wanted, names)
-            for theirs, _ in wanted.values():
-                if names.count(theirs) > 1:
-                    found = f"{names.count(theirs)} columns '{theirs}'"
+            _check_columns(path, columns, names)
+            for column, _ in columns.values():
+                if names.count(column) > 1:
+                    found = f"{names.count(column)} columns '{column}'"
                     raise input_error(path, found, "a name of its own for each", "columns")
-            where = {name: names.index(theirs) for name, (theirs, _) in wanted.items()}
-            if how.units_row:
+            indices = {name: names.index(column) for name, (column, _) in columns.items()}
+            if setup.units_row:
                 next(lines, None)
             while rows := list(islice(lines, ROWS)):
-                yield _rows(path, rows, where, delimiter, len(names))
+                yield _rows(path, rows, indices, delimiter, len(names))
     except LookupError:
-        allowed = "a name such as utf-8, latin-1 or utf-16"
-        raise input_error(path, f"unknown encoding '{how.encoding}'", allowed, "encoding") from None
+        known = "a name such as utf-8, latin-1 or utf-16"
+        raise input_error(path, f"unknown encoding '{setup.encoding}'", known, "encoding") from None
     except UnicodeDecodeError as error:
         found = f"byte {error.start} is not {error.encoding}"
         raise input_error(path, found, 'its encoding, such as encoding = "latin-1"') from None
@@ -91,17 +91,17 @@ def _lines(text: io.TextIOWrapper, skip: int) -> Iterator[tuple[int, str]]:
 
 
 def _rows(
-    path: Path, rows: list[tuple[int, str]], where: Mapping[str, int], delimiter: str, width: int
+    path: Path, rows: list[tuple[int, str]], indices: Mapping[str, int], delimiter: str, width: int
 ) -> Piece:
-    """Return the columns of some lines; `where` their places, `width` the number of columns."""
+    """Return the columns of some lines; `indices` their places, `width` the number of columns."""
     if delimiter != ",":
         rows = [(number, line.replace(",", ".")) for number, line in rows]  # a decimal comma
-    places = sorted(set(where.values()))
-    written = [line for _, line in rows]
+    places = sorted(set(indices.values()))
+    texts = [line for _, line in rows]
     try:
-        if any(line.count(delimiter) != width - 1 for line in written):
+        if any(line.count(delimiter) != width - 1 for line in texts):
             raise ValueError("another number of columns")
-        table = np.loadtxt(written, delimiter=delimiter, usecols=places, ndmin=2, comments=None)
+        table = np.loadtxt(texts, delimiter=delimiter, usecols=places, ndmin=2, comments=None)
         rows = []
     except ValueError:  # an empty cell, or what is named below
         table = np.empty((len(rows), len(places)))
@@ -116,18 +116,18 @@ def _rows(
             found = f"not a number ({error})".replace("could not convert string to float: ", "")
             allowed = "numbers, or nothing in a gap"
             raise input_error(path, found, allowed, f"line {number}") from None
-    return {name: table[:, places.index(place)] for name, place in where.items()}
+    return {name: table[:, places.index(place)] for name, place in indices.items()}
 
 
-def _parquet(path: Path, wanted: Wanted, _: MeasurementFile) -> Iterator[Piece]:
+def _parquet(path: Path, columns: Columns, _: MeasurementFile) -> Iterator[Piece]:
     parquet = optional_package("pyarrow.parquet", "reading Parquet", "'railsim[parquet]'")
     try:
         file = parquet.ParquetFile(path)
-        _named(path, wanted, file.schema_arrow.names)
-        theirs = list(dict.fromkeys(column for column, _ in wanted.values()))
-        for batch in file.iter_batches(ROWS, columns=theirs):
-            own = {n: batch.column(column).cast("float64") for n, (column, _) in wanted.items()}
-            yield {name: np.array(column, dtype=np.float64) for name, column in own.items()}
+        _check_columns(path, columns, file.schema_arrow.names)
+        names = list(dict.fromkeys(column for column, _ in columns.values()))
+        for batch in file.iter_batches(ROWS, columns=names):
+            arrays = {n: batch.column(column).cast("float64") for n, (column, _) in columns.items()}
+            yield {name: np.array(column, dtype=np.float64) for name, column in arrays.items()}
     except InputError:
         raise
     except Exception as error:  # pyarrow's own errors have no common base
@@ -135,68 +135,68 @@ def _parquet(path: Path, wanted: Wanted, _: MeasurementFile) -> Iterator[Piece]:
 
 
 def _hdf5(
-    path: Path, wanted: Wanted, _: MeasurementFile, *, matlab: bool = False
+    path: Path, columns: Columns, _: MeasurementFile, *, matlab: bool = False
 ) -> Iterator[Piece]:
     """Yield pieces; MATLAB stores its arrays with their dimensions in the opposite order."""
     import h5py
 
     try:
         with h5py.File(path, "r") as file:
-            known: list[str] = []
+            names: list[str] = []
             file.visititems(
-                lambda name, node: known.append(name) if isinstance(node, h5py.Dataset) else None
+                lambda name, node: names.append(name) if isinstance(node, h5py.Dataset) else None
             )
-            _named(path, wanted, known)
-            own = {column: file[column] for column, _ in wanted.values()}
+            _check_columns(path, columns, names)
+            arrays = {column: file[column] for column, _ in columns.values()}
             if matlab:
-                own = {column: np.transpose(array[()]) for column, array in own.items()}
-            yield from _slices(path, {n: own[column] for n, (column, _) in wanted.items()}, wanted)
+                arrays = {column: np.transpose(array[()]) for column, array in arrays.items()}
+            yield from _slices(path, {n: arrays[c] for n, (c, _) in columns.items()}, columns)
     except OSError as error:
-        words = str(error).partition("(")[2].rstrip(")") or str(error)
-        raise input_error(path, f"cannot be read as HDF5 ({words})") from None
+        message = str(error).partition("(")[2].rstrip(")") or str(error)
+        raise input_error(path, f"cannot be read as HDF5 ({message})") from None
 
 
-def _matlab(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
+def _matlab(path: Path, columns: Columns, setup: MeasurementFile) -> Iterator[Piece]:
     from scipy import io as matlab
     from scipy.io.matlab import MatReadError
 
     with open_regular(path) as file:
         newer = file.read(10) == b"MATLAB 7.3"
     if newer:  # HDF5 under another name
-        yield from _hdf5(path, wanted, how, matlab=True)
+        yield from _hdf5(path, columns, setup, matlab=True)
         return
-    theirs = list(dict.fromkeys(column for column, _ in wanted.values()))
+    names = list(dict.fromkeys(column for column, _ in columns.values()))
     try:
         kinds = {name: kind for name, _, kind in matlab.whosmat(path)}
-        _named(path, wanted, list(kinds))
-        for name in theirs:
+        _check_columns(path, columns, list(kinds))
+        for name in names:
             if kinds[name] not in NUMERIC:
                 raise input_error(path, f"a {kinds[name]}", "an array of numbers", name)
-        arrays = matlab.loadmat(path, variable_names=theirs, squeeze_me=False)
+        arrays = matlab.loadmat(path, variable_names=names, squeeze_me=False)
     except InputError:
         raise
     except (ValueError, TypeError, OSError, NotImplementedError, zlib.error, MatReadError) as error:
         raise _unreadable(path, "MATLAB", error) from None
-    yield from _slices(path, {n: arrays[column] for n, (column, _) in wanted.items()}, wanted)
+    yield from _slices(path, {n: arrays[column] for n, (column, _) in columns.items()}, columns)
 
 
-def _slices(path: Path, arrays: Mapping[str, Any], wanted: Wanted) -> Iterator[Piece]:
+def _slices(path: Path, arrays: Mapping[str, Any], columns: Columns) -> Iterator[Piece]:
     """Yield pieces of arrays with time first; a single row or column is a series."""
-    lengths = {name: _length(path, array, *wanted[name]) for name, array in arrays.items()}
+    lengths = {name: _length(path, array, *columns[name]) for name, array in arrays.items()}
     if len(set(lengths.values())) > 1:
         first = next(iter(lengths))
         name = next(name for name in lengths if lengths[name] != lengths[first])
-        found = f"{lengths[name]} values, '{wanted[first][0]}' has {lengths[first]}"
-        raise input_error(path, found, "arrays of one length", wanted[name][0])
+        found = f"{lengths[name]} values, '{columns[first][0]}' has {lengths[first]}"
+        raise input_error(path, found, "arrays of one length", columns[name][0])
     count = next(iter(lengths.values()))
     for begin in range(0, count, ROWS):
         rows = slice(begin, min(begin + ROWS, count))
         piece = {}
         for name, array in arrays.items():
-            at: tuple[Any, ...] = (rows, *wanted[name][1])
-            if len(at) == 1 and array.ndim == 2:  # a single row or column
-                at = (0, rows) if array.shape[0] == 1 else (rows, 0)
-            piece[name] = np.asarray(array[at], dtype=np.float64)
+            index: tuple[Any, ...] = (rows, *columns[name][1])
+            if len(index) == 1 and array.ndim == 2:  # a single row or column
+                index = (0, rows) if array.shape[0] == 1 else (rows, 0)
+            piece[name] = np.asarray(array[index], dtype=np.float64)
         yield piece
 
 
@@ -214,7 +214,7 @@ def _length(path: Path, array: Any, column: str, index: tuple[int, ...]) -> int:
     return int(shape[0])
 
 
-_READERS: dict[str, Callable[[Path, Wanted, MeasurementFile], Iterator[Piece]]] = {
+_READERS: dict[str, Callable[[Path, Columns, MeasurementFile], Iterator[Piece]]] = {
     ".csv": _csv,
     ".txt": _csv,
     ".parquet": _parquet,

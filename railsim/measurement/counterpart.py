@@ -27,8 +27,8 @@ def compared(measurement: Measurement) -> dict[str, str]:
 
 def rests(x: Floats) -> bool:
     """Return whether a channel does not change, as of a dead sensor; NaN where it has no value."""
-    known = x[np.isfinite(x)]
-    return not len(known) or bool(np.ptp(known) <= RESTS * np.abs(known).max())
+    finite = x[np.isfinite(x)]
+    return not len(finite) or bool(np.ptp(finite) <= RESTS * np.abs(finite).max())
 
 
 def check_channels(file: str, measurement: Measurement, vehicle: Vehicle) -> None:
@@ -39,7 +39,7 @@ def check_channels(file: str, measurement: Measurement, vehicle: Vehicle) -> Non
     flat = flatten(vehicle)
     wheelsets = [body.name for body in flat.of_kind("wheelset")]
     numbers = [str(number + 1) for number in range(len(wheelsets))]
-    known = {
+    labels_of = {
         "wheelset": [*wheelsets, *numbers],
         "side": SIDES,
         "axis": COMPONENTS[:3],
@@ -53,10 +53,10 @@ def check_channels(file: str, measurement: Measurement, vehicle: Vehicle) -> Non
         base, *labels = selection.split(":")
         quantity = QUANTITIES.get(base) or REQUESTED[base]
         for dim, label in zip(quantity.dims[1:], labels, strict=True):
-            if label not in known.get(dim, [label]):
+            if label not in labels_of.get(dim, [label]):
                 found = f"{vehicle.name} has no {dim} '{label}'"
                 key = f"channels.{name}.quantity"
-                faults.append(Fault(file, key, found, nearest(label, known[dim])))
+                faults.append(Fault(file, key, found, nearest(label, labels_of[dim])))
     faults.check()
 
 
@@ -64,18 +64,18 @@ def outputs_for(selections: Iterable[str]) -> dict[str, Any]:
     """Return the table `outputs` of settings for some quantities with labels."""
     names = [selection.split(":") for selection in selections]
     bases = {name[0] for name in names}
-    found: dict[str, Any] = {}
+    outputs: dict[str, Any] = {}
     for base in sorted(bases & {*REQUESTED}):
         request = REQUESTED[base].request
         if request == "elements":
-            found["elements"] = sorted({n[1] for n in names if n[0].startswith("element_")})
+            outputs["elements"] = sorted({n[1] for n in names if n[0].startswith("element_")})
         elif request == "sensors":
             only = all(b in READINGS for b in bases if b.startswith("sensor_"))
-            found["sensors"] = "readings" if only else True
+            outputs["sensors"] = "readings" if only else True
         else:
-            found[request] = True
-    found["quantities"] = sorted(bases & {*QUANTITIES}) or ["distance"]
-    return found
+            outputs[request] = True
+    outputs["quantities"] = sorted(bases & {*QUANTITIES}) or ["distance"]
+    return outputs
 
 
 def series(result: Result, selection: str) -> Floats:
@@ -93,12 +93,12 @@ def amplifier(channel: Channel, f: Floats) -> Complexes:
     """Return the response of the filters of a channel at frequencies [Hz]."""
     from scipy import signal
 
-    found, s = np.ones(len(f), complex), 2j * np.pi * f
+    response, s = np.ones(len(f), complex), 2j * np.pi * f
     for corner, kind in ((channel.low_pass, "lowpass"), (channel.high_pass, "highpass")):
         if corner is not None:
             b, a = signal.butter(4, 2.0 * np.pi * corner, kind, analog=True)  # type: ignore[call-overload]
-            found *= np.polyval(b, s) / np.polyval(a, s)
-    return found
+            response *= np.polyval(b, s) / np.polyval(a, s)
+    return response
 
 
 def amplified(x: Floats, rate: float, channel: Channel) -> Floats:

@@ -57,23 +57,23 @@ class Measurement:
 
     def channel(self, name: str) -> Channel:
         """Return what the file says about a channel, by its name or quantity."""
-        return self.definition.channels[self._called(name)]
+        return self.definition.channels[self._channel_name(name)]
 
     def __getitem__(self, name: str) -> Floats:
         """Return the values of a channel, by its name or its quantity [SI]."""
-        return self.channels[self._called(name)]
+        return self.channels[self._channel_name(name)]
 
     def __contains__(self, name: object) -> bool:
         return name in self.channels or name in self.quantities.values()
 
-    def _called(self, name: str) -> str:
+    def _channel_name(self, name: str) -> str:
         if name in self.channels:
             return name
-        for own, quantity in self.quantities.items():
+        for channel, quantity in self.quantities.items():
             if quantity == name:
-                return own
-        known = [*self.channels, *self.quantities.values()]
-        raise KeyError(f"no channel '{name}'; {nearest(name, known)}")
+                return channel
+        names = [*self.channels, *self.quantities.values()]
+        raise KeyError(f"no channel '{name}'; {nearest(name, names)}")
 
     def part(self, begin: float, end: float) -> "Measurement":
         """Return the values between two arc lengths [m]."""
@@ -91,14 +91,14 @@ class Measurement:
         time = self.time[0] + np.arange(count) / rate
         lower = rate < self.rate * (1.0 - 1e-9)
 
-        def taken(x: Floats) -> Floats:
-            whole = _bridged(x)
-            whole = low_passed(whole, self.rate, 0.4 * rate) if lower else whole
-            lost = np.interp(time, self.time, np.isnan(x).astype(float)) > 0.0
-            return np.where(lost, np.nan, np.interp(time, self.time, whole))
+        def resample(x: Floats) -> Floats:
+            bridged = _bridged(x)
+            bridged = low_passed(bridged, self.rate, 0.4 * rate) if lower else bridged
+            missing = np.interp(time, self.time, np.isnan(x).astype(float)) > 0.0
+            return np.where(missing, np.nan, np.interp(time, self.time, bridged))
 
         distance, speed = (np.interp(time, self.time, x) for x in (self.distance, self.speed))
-        channels = {name: taken(x) for name, x in self.channels.items()}
+        channels = {name: resample(x) for name, x in self.channels.items()}
         return replace(self, time=time, distance=distance, speed=speed, channels=channels)
 
     def filtered(self, low: float = 0.0, high: float = np.inf) -> "Measurement":
@@ -107,10 +107,10 @@ class Measurement:
         Gaps are bridged for the filter and left out again.
         """
 
-        def passed(x: Floats) -> Floats:
+        def band_pass(x: Floats) -> Floats:
             return np.where(np.isnan(x), np.nan, band_passed(_bridged(x), self.rate, low, high))
 
-        return replace(self, channels={name: passed(x) for name, x in self.channels.items()})
+        return replace(self, channels={name: band_pass(x) for name, x in self.channels.items()})
 
     def moved(self, shift: float, stretch: float = 0.0) -> "Measurement":
         """Return the run with other arc lengths: s + shift + stretch (s - s of the first value)."""
@@ -125,9 +125,9 @@ class Measurement:
     def _repr_html_(self) -> str:
         rows: list[list[object]] = []
         for name, x in self.channels.items():
-            known = x[np.isfinite(x)]
-            spread = [known.min(), known.max()] if len(known) else [np.nan, np.nan]
-            share = 100.0 * (1.0 - len(known) / len(x))
+            finite = x[np.isfinite(x)]
+            spread = [finite.min(), finite.max()] if len(finite) else [np.nan, np.nan]
+            share = 100.0 * (1.0 - len(finite) / len(x))
             rows.append([name, self.quantities[name], *spread, share])
         columns = ["channel", "quantity", "least (SI)", "largest (SI)", "missing (%)"]
         return Table(columns, rows, self.name).html()
@@ -139,5 +139,5 @@ class Measurement:
 
 def _bridged(x: Floats) -> Floats:
     """Return values with straight lines over the gaps."""
-    known = np.flatnonzero(np.isfinite(x))
-    return np.interp(np.arange(len(x)), known, x[known]) if 0 < len(known) < len(x) else x
+    valid = np.flatnonzero(np.isfinite(x))
+    return np.interp(np.arange(len(x)), valid, x[valid]) if 0 < len(valid) < len(x) else x

@@ -40,11 +40,11 @@ class Likeness:
             other = ", or that of the other side" * sided  # loads of both are opposite
             found = f"the opposite sign (correlation {self.correlation:.2f})"
             return f"{name} has {found}: 'reverse'{other}?"
-        for words, factor in UNITS:
+        for times, factor in UNITS:
             if 1.0 / NEAR < self.ratio / factor < NEAR and (
                 self.correlation > ALIKE or max(factor, 1.0 / factor) > 100.0
             ):
-                return f"{name} is {words} times the simulated one: another 'unit'?"
+                return f"{name} is {times} times the simulated one: another 'unit'?"
         if abs(self.drift) > APART * step:
             return f"{name}: its clock runs apart by {1e3 * self.drift:.3g} ms over the record."
         if self.correlation > SURE and abs(self.lag) > APART * step:
@@ -58,10 +58,10 @@ def likeness(measured: Floats, simulated: Floats, step: float) -> Likeness:
 
     `step`: between two values [s].
     """
-    known = np.isfinite(measured) & np.isfinite(simulated)
-    a, b = np.where(known, measured, 0.0), np.where(known, simulated, 0.0)
+    valid = np.isfinite(measured) & np.isfinite(simulated)
+    a, b = np.where(valid, measured, 0.0), np.where(valid, simulated, 0.0)
     energy = float(np.sqrt(np.sum(a**2))), float(np.sqrt(np.sum(b**2)))
-    if known.sum() < 10 or not all(energy):
+    if valid.sum() < 10 or not all(energy):
         return Likeness(np.nan, np.nan, np.nan, np.nan)
     correlation, lag = _best(measured, simulated, step)
     return Likeness(correlation, energy[0] / energy[1], lag, _drift(measured, simulated, step))
@@ -70,11 +70,11 @@ def likeness(measured: Floats, simulated: Floats, step: float) -> Likeness:
 def _drift(a: Floats, b: Floats, step: float) -> float:
     """Change of the lag over the record by a line through that of each part; NaN if unclear."""
     size = len(a) // PARTS
-    found = [_best(a[k * size : (k + 1) * size], b[k * size : (k + 1) * size], step)
+    lags_found = [_best(a[k * size : (k + 1) * size], b[k * size : (k + 1) * size], step)
              for k in range(PARTS)]  # fmt: skip
-    if min(correlation for correlation, _ in found) < SURE:
+    if min(correlation for correlation, _ in lags_found) < SURE:
         return np.nan
-    lags = np.array([lag for _, lag in found])
+    lags = np.array([lag for _, lag in lags_found])
     slope, middle = np.polyfit(np.arange(PARTS), lags, 1)
     off = float(np.max(np.abs(lags - middle - slope * np.arange(PARTS))))
     drift = float(slope * PARTS)
@@ -92,16 +92,16 @@ def _best(a: Floats, b: Floats, step: float) -> tuple[float, float]:
     lags = np.arange(-reach, reach + 1)
 
     def products(x: Floats, y: Floats) -> Floats:
-        found = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
-        return np.asarray(found[lags])
+        product = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        return np.asarray(product[lags])
 
-    here, there = np.isfinite(a), np.isfinite(b)
+    in_a, in_b = np.isfinite(a), np.isfinite(b)
     # a wheel load is alike at any shift but for its changes
     a, b = (
-        np.where(k, x - (x[k].mean() if k.any() else 0.0), 0.0) for k, x in ((here, a), (there, b))
+        np.where(k, x - (x[k].mean() if k.any() else 0.0), 0.0) for k, x in ((in_a, a), (in_b, b))
     )
     values = products(a, b)
-    for energy in (products(a**2, 1.0 * there), products(1.0 * here, b**2)):
+    for energy in (products(a**2, 1.0 * in_b), products(1.0 * in_a, b**2)):
         values /= np.sqrt(np.maximum(energy, max(SHARED * float(energy.max()), 1e-300)))
     k = int(np.argmax(np.abs(values)))
     return float(values[k]), float(lags[k] * step)
@@ -120,30 +120,30 @@ def suspicions(
     `quantities`: with their labels, by channel. Without `clocks` not on clocks: of a model whose
     phases are not right yet.
     """
-    found = {name: likeness(measured[name], simulated[name], step) for name in measured}
-    clear = [one.lag for one in found.values() if one.correlation > SURE]
+    likenesses = {name: likeness(measured[name], simulated[name], step) for name in measured}
+    clear = [like.lag for like in likenesses.values() if like.correlation > SURE]
     common = float(np.median(clear)) if clear else 0.0
-    drifts = [one.drift for one in found.values() if np.isfinite(one.drift)]
+    drifts = [like.drift for like in likenesses.values() if np.isfinite(like.drift)]
     drift = float(np.median(drifts)) if len(drifts) > 1 else 0.0
-    exchanged = _exchanged(found, measured, simulated, quantities, step)
-    said = []
-    for name, one in found.items():
+    exchanged = _exchanged(likenesses, measured, simulated, quantities, step)
+    texts = []
+    for name, like in likenesses.items():
         if name in exchanged:
-            said.append(f"{name} is like the simulated {exchanged[name]}, not its own: exchanged?")
+            texts.append(f"{name} is like the simulated {exchanged[name]}, not its own: exchanged?")
             continue
-        own = {"lag": clocks * (one.lag - common), "drift": clocks * (one.drift - drift)}
+        corrected = {"lag": clocks * (like.lag - common), "drift": clocks * (like.drift - drift)}
         sided = quantities[name].endswith(SIDES)
-        said.append(replace(one, **own).remark(name, step, sided=sided))
+        texts.append(replace(like, **corrected).remark(name, step, sided=sided))
     if clocks and abs(drift) > APART * step:
-        said.append(
+        texts.append(
             f"All channels run apart from the simulation by {1e3 * drift:.3g} ms over the "
             "record: the mileage or the clock drifts."
         )
-    return [words for words in said if words]
+    return [remark for remark in texts if remark]
 
 
 def _exchanged(
-    found: Mapping[str, Likeness],
+    likenesses: Mapping[str, Likeness],
     measured: Series,
     simulated: Series,
     quantities: Mapping[str, str],
@@ -154,11 +154,11 @@ def _exchanged(
     They are less like their own, of either sign: loads of both sides are opposite in curves.
     """
     pairs: dict[str, str] = {}
-    unlike = (name for name, one in found.items() if one.correlation < ALIKE)
+    unlike = (name for name, like in likenesses.items() if like.correlation < ALIKE)
     for pair in combinations(unlike, 2):
         kinds = {quantities[name].partition(":")[0] for name in pair}
         if len(kinds) == 1 and all(
-            _best(measured[a], simulated[b], step)[0] > max(SURE, abs(found[a].correlation))
+            _best(measured[a], simulated[b], step)[0] > max(SURE, abs(likenesses[a].correlation))
             for a, b in (pair, pair[::-1])
         ):
             pairs |= {pair[0]: pair[1], pair[1]: pair[0]}

@@ -18,7 +18,7 @@ WRONG = 0.5  # of the distance: refused
 
 
 def position(
-    file: str, how: MeasurementFile, time: Floats, axes: dict[str, Floats], mileage: Origin | None
+    file: str, setup: MeasurementFile, time: Floats, axes: dict[str, Floats], mileage: Origin | None
 ) -> tuple[Floats, Floats, list[str]]:
     """Return arc length [m], speed [m/s] and remarks of a run.
 
@@ -30,31 +30,31 @@ def position(
     remarks: list[str] = []
     step = (time[-1] - time[0]) / (len(time) - 1)
     speed = axes.get("speed")
-    if speed is None and how.speed is not None and not {"distance", "mileage"} & {*axes}:
-        speed = np.full(len(time), how.speed)
+    if speed is None and setup.speed is not None and not {"distance", "mileage"} & {*axes}:
+        speed = np.full(len(time), setup.speed)
     driven = None
     if speed is not None:
-        speed = _known(file, "speed", time, speed, remarks)
+        speed = _without_gaps(file, "speed", time, speed, remarks)
         driven = np.concatenate([[0.0], np.cumsum(0.5 * step * (speed[1:] + speed[:-1]))])
     counter = axes.get("distance")
     if counter is None and "mileage" in axes:
         counter = axes["mileage"]
-        known = counter[np.isfinite(counter)]
-        way = float(known[-1] - known[0]) if len(known) else 0.0
+        finite = counter[np.isfinite(counter)]
+        way = float(finite[-1] - finite[0]) if len(finite) else 0.0
         falls = way < 0.0 if mileage is None else mileage[1]
         if (way > 0.0) if falls else (way < 0.0):
-            words = ("rises", "falls") if falls else ("falls", "rises")
-            allowed = f"as on the track, where it {words[1]}; for a run in the other direction the "
+            trend = ("rises", "falls") if falls else ("falls", "rises")
+            allowed = f"as on the track, where it {trend[1]}; for a run in the other direction the "
             allowed += "track file from its other end"
-            raise input_error(file, words[0], allowed, key="mileage")
-        origin = known[0] if mileage is None and len(known) else (mileage or (0.0,))[0]
+            raise input_error(file, trend[0], allowed, key="mileage")
+        origin = finite[0] if mileage is None and len(finite) else (mileage or (0.0,))[0]
         counter = (-1.0 if falls else 1.0) * (counter - origin)
         if mileage is None:
-            counter = counter + how.start
+            counter = counter + setup.start
     if counter is None:
         assert driven is not None  # by the definition
         assert speed is not None
-        return how.start + driven, speed, remarks
+        return setup.start + driven, speed, remarks
     s = _rising(file, time, counter, remarks)
     if driven is None or speed is None:
         mean = float((s[-1] - s[0]) / (time[-1] - time[0]))
@@ -75,33 +75,33 @@ def position(
     return s, speed, remarks
 
 
-def _known(file: str, name: str, time: Floats, x: Floats, remarks: list[str]) -> Floats:
-    known = np.isfinite(x)
-    if known.sum() < 2:
+def _without_gaps(file: str, name: str, time: Floats, x: Floats, remarks: list[str]) -> Floats:
+    valid = np.isfinite(x)
+    if valid.sum() < 2:
         raise input_error(file, "no values", "a channel with values", key=name)
-    if not known.all():
-        remarks.append(f"The {name} has gaps ({100 * np.mean(~known):.3g} %): linear over them.")
-        x = np.interp(time, time[known], x[known])
+    if not valid.all():
+        remarks.append(f"The {name} has gaps ({100 * np.mean(~valid):.3g} %): linear over them.")
+        x = np.interp(time, time[valid], x[valid])
     if name == "speed" and x.min() < -0.1:
         raise input_error(file, f"{x.min():.3g} m/s", "speeds forwards; 'reverse'?", key=name)
     return x
 
 
 def _rising(file: str, time: Floats, counter: Floats, remarks: list[str]) -> Floats:
-    s = _known(file, "distance", time, counter, remarks)
+    s = _without_gaps(file, "distance", time, counter, remarks)
     highest = np.maximum.accumulate(s)
     back = float(np.max(highest - s))
     if back > BACKWARDS or s[-1] <= s[0]:
         found = f"falls by {back:.3g} m" if s[-1] > s[0] else "does not rise"
         allowed = "a distance that rises; a mileage may fall (quantity = 'mileage')"
         raise input_error(file, found, allowed, key="distance")
-    moved = np.concatenate([[True], np.diff(highest) > 0.0])
-    if not moved.all():
-        s = np.interp(time, time[moved], s[moved])
-        last = time[moved][-1]
-        tail = ~moved & (time > last)
+    moving = np.concatenate([[True], np.diff(highest) > 0.0])
+    if not moving.all():
+        s = np.interp(time, time[moving], s[moving])
+        last = time[moving][-1]
+        tail = ~moving & (time > last)
         if tail.any():  # less than a further step of the counter: the vehicle may stand
-            further = float(s[moved][-1] - s[moved][-2])
-            speed = min((s[moved][-1] - s[0]) / (last - time[0]), further / (time[-1] - last))
+            further = float(s[moving][-1] - s[moving][-2])
+            speed = min((s[moving][-1] - s[0]) / (last - time[0]), further / (time[-1] - last))
             s[tail] += speed * (time[tail] - last)
     return s

@@ -12,7 +12,7 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.measurement import AXES, FEWEST, MeasurementFile, quantity_of
 from railsim.errors import Fault, Faults, input_error, nearest
 from railsim.files import sources
-from railsim.measurement.clock import Clock, bridged, clock_of, delayed, joined
+from railsim.measurement.clock import Clock, bridged, clock_of, delayed, joined_times
 from railsim.measurement.columns import pieces
 from railsim.measurement.data import Measurement
 from railsim.measurement.position import position
@@ -59,88 +59,88 @@ def load_measurement(
         name = source.data.get(key)
         if isinstance(name, str) and name and (folder / name).is_file():
             source.data[key] = str((folder / name).resolve())
-    how = loaded(MeasurementFile, source, overrides)
-    wanted = _wanted(str(path), how, channels)
-    parts = _read(how, wanted)
-    times = [name for name in wanted if how.channels[name].quantity == "time"]
+    setup = loaded(MeasurementFile, source, overrides)
+    names = _channel_names(str(path), setup, channels)
+    parts = _read(setup, names)
+    times = [name for name in names if setup.channels[name].quantity == "time"]
     remarks: list[str] = []
     if times:
-        channel = how.channels[times[0]]
-        written, anew = joined([
+        channel = setup.channels[times[0]]
+        times_read, restarts = joined_times([
             channel.factor * (part - channel.offset) for part in parts[times[0]]
         ])  # fmt: skip
-        if anew:
-            remarks.append(f"The clock begins anew in {anew} files; they follow each other.")
-        clock = clock_of(how.file[0], written)
+        if restarts:
+            remarks.append(f"The clock begins anew in {restarts} files; they follow each other.")
+        clock = clock_of(setup.file[0], times_read)
     else:
-        count = sum(map(len, parts[wanted[0]]))
-        assert how.rate is not None  # by the definition
-        clock = Clock(np.arange(count) / how.rate, how.rate, np.arange(count), np.empty(0))
+        count = sum(map(len, parts[names[0]]))
+        assert setup.rate is not None  # by the definition
+        clock = Clock(np.arange(count) / setup.rate, setup.rate, np.arange(count), np.empty(0))
     if clock.rate < SLOWEST:
         found = f"{clock.rate:.3g} values per second"
         allowed = f"{SLOWEST:g} at least; the 'unit' of the time?"
-        raise input_error(how.file[0], found, allowed, key="rate" if how.rate else "time")
+        raise input_error(setup.file[0], found, allowed, key="rate" if setup.rate else "time")
     remarks += clock.remarks
     values, faults = {}, Faults()
-    for name in wanted:
-        own = parts.pop(name)  # freed as it is converted
+    for name in names:
+        pieces_of = parts.pop(name)  # freed as it is converted
         if name not in times:
-            values[name] = _channel(name, how, np.concatenate(own), clock, remarks)
-            faults += _implausible(how, name, values[name])
+            values[name] = _channel(name, setup, np.concatenate(pieces_of), clock, remarks)
+            faults += _implausible(setup, name, values[name])
     faults.check()
-    return _measurement(str(path), how, clock, values, remarks)
+    return _measurement(str(path), setup, clock, values, remarks)
 
 
-def _wanted(file: str, how: MeasurementFile, asked: Sequence[str] | None) -> list[str]:
+def _channel_names(file: str, setup: MeasurementFile, requested: Sequence[str] | None) -> list[str]:
     """Return the names of the channels to read: those asked for, and time and place."""
-    names = list(how.channels)
-    if asked is None:
+    names = list(setup.channels)
+    if requested is None:
         return names
-    by_quantity = {channel.quantity: name for name, channel in how.channels.items()}
-    found = {name for name in names if how.channels[name].quantity in AXES}
+    by_quantity = {channel.quantity: name for name, channel in setup.channels.items()}
+    chosen = {name for name in names if setup.channels[name].quantity in AXES}
     faults = Faults()
-    for one in asked:
-        name = one if one in how.channels else by_quantity.get(one)
+    for item in requested:
+        name = item if item in setup.channels else by_quantity.get(item)
         if name is None:
-            known = nearest(one, [*names, *by_quantity])
-            faults.append(Fault(file, "channels", f"no channel '{one}'", known))
+            hint = nearest(item, [*names, *by_quantity])
+            faults.append(Fault(file, "channels", f"no channel '{item}'", hint))
         else:
-            found.add(name)
+            chosen.add(name)
     faults.check()
-    return [name for name in names if name in found]
+    return [name for name in names if name in chosen]
 
 
-def _read(how: MeasurementFile, wanted: list[str]) -> dict[str, list[Floats]]:
+def _read(setup: MeasurementFile, names: list[str]) -> dict[str, list[Floats]]:
     """Return values as the files have them: for each channel an array for each file."""
-    columns = {n: (how.channels[n].column or n, how.channels[n].index) for n in wanted}
-    found: dict[str, list[Floats]] = {name: [] for name in wanted}
+    columns = {n: (setup.channels[n].column or n, setup.channels[n].index) for n in names}
+    arrays: dict[str, list[Floats]] = {name: [] for name in names}
     count = 0
-    for file in how.file:
-        own: dict[str, list[Floats]] = {name: [] for name in wanted}
-        for piece in pieces(Path(file), columns, how):
+    for file in setup.file:
+        pieces_of: dict[str, list[Floats]] = {name: [] for name in names}
+        for piece in pieces(Path(file), columns, setup):
             for name, x in piece.items():
-                own[name].append(np.ascontiguousarray(x))
+                pieces_of[name].append(np.ascontiguousarray(x))
             count += len(x) * len(piece)
             if count > MOST_VALUES:
                 allowed = f"{MOST_VALUES:g} at most; name fewer channels"
                 raise input_error(file, "too many values", allowed)
-        for name in wanted:
-            parts = own.pop(name)  # freed as it is joined
-            found[name].append(np.concatenate(parts) if parts else np.empty(0))
+        for name in names:
+            parts = pieces_of.pop(name)  # freed as it is joined
+            arrays[name].append(np.concatenate(parts) if parts else np.empty(0))
             del parts
-    rows = sum(map(len, found[wanted[0]]))
+    rows = sum(map(len, arrays[names[0]]))
     if rows < FEWEST:
-        raise input_error(how.file[0], f"{rows} values", f"{FEWEST} at least")
-    return found
+        raise input_error(setup.file[0], f"{rows} values", f"{FEWEST} at least")
+    return arrays
 
 
 def _channel(
-    name: str, how: MeasurementFile, x: Floats, clock: Clock, remarks: list[str]
+    name: str, setup: MeasurementFile, x: Floats, clock: Clock, remarks: list[str]
 ) -> Floats:
     """Return a channel at the equal time steps, in SI, with railsim's sign."""
-    channel = how.channels[name]
+    channel = setup.channels[name]
     x = np.where(np.isinf(x), np.nan, x)
-    for value in how.missing:
+    for value in setup.missing:
         x[np.abs(x - value) <= SINGLE * abs(value)] = np.nan
     if channel.range is not None:
         low, high = channel.range
@@ -150,22 +150,22 @@ def _channel(
             x[outside] = np.nan
     elif clipped := _clipped(x):
         remarks.append(f"{name} {clipped}: give its range to leave these values out.")
-    known = x[np.isfinite(x)]
-    if channel.quantity not in AXES and len(known) and known.min() == known.max():
-        remarks.append(f"{name} is {known[0]:g} from its first value to its last: a dead sensor?")
+    finite = x[np.isfinite(x)]
+    if channel.quantity not in AXES and len(finite) and finite.min() == finite.max():
+        remarks.append(f"{name} is {finite[0]:g} from its first value to its last: a dead sensor?")
     x = clock.on_grid(channel.factor * (x - channel.offset))
     if channel.delay:
         x = delayed(x, channel.delay * clock.rate)
-    x = bridged(x, round(how.longest_gap * clock.rate))
-    unknown = float(np.mean(np.isnan(x)))
-    if unknown and channel.quantity not in AXES:
-        remarks.append(f"{name}: {100.0 * unknown:.3g} % of the values are missing.")
+    x = bridged(x, round(setup.longest_gap * clock.rate))
+    missing = float(np.mean(np.isnan(x)))
+    if missing and channel.quantity not in AXES:
+        remarks.append(f"{name}: {100.0 * missing:.3g} % of the values are missing.")
     return x
 
 
-def _zeroed(path: str, name: str, how: MeasurementFile, x: Floats, time: Floats) -> Floats:
+def _zeroed(path: str, name: str, setup: MeasurementFile, x: Floats, time: Floats) -> Floats:
     """Return a channel without its mean between the times of `zero`."""
-    zero = how.channels[name].zero
+    zero = setup.channels[name].zero
     if zero is None:
         return x
     inside = (time >= zero[0]) & (time <= zero[1]) & np.isfinite(x)
@@ -178,55 +178,55 @@ def _zeroed(path: str, name: str, how: MeasurementFile, x: Floats, time: Floats)
 
 def _clipped(x: Floats) -> str:
     """Return how often a channel rests at its largest or smallest value, if it looks clipped."""
-    known = x[np.isfinite(x)]
-    if len(known) < FEWEST or known.min() == known.max():
+    finite = x[np.isfinite(x)]
+    if len(finite) < FEWEST or finite.min() == finite.max():
         return ""
-    for value, word in ((known.max(), "largest"), (known.min(), "smallest")):
-        lengths = [end - begin for begin, end in stretches(known == value)]
+    for value, word in ((finite.max(), "largest"), (finite.min(), "smallest")):
+        lengths = [end - begin for begin, end in stretches(finite == value)]
         if sum(length >= EQUAL_ENDS for length in lengths) >= OFTEN and value != 0.0:
             return f"rests {len(lengths)} times at its {word} value {value:g} and looks clipped"
     return ""
 
 
-def _implausible(how: MeasurementFile, name: str, x: Floats) -> list[Fault]:
+def _implausible(setup: MeasurementFile, name: str, x: Floats) -> list[Fault]:
     """Return what no vehicle can do: mostly a wrong unit."""
-    quantity = how.channels[name].quantity
-    known = np.abs(x[np.isfinite(x)])
+    quantity = setup.channels[name].quantity
+    magnitudes = np.abs(x[np.isfinite(x)])
     kind = quantity_of(quantity)
-    if not len(known) or kind is None:
+    if not len(magnitudes) or kind is None:
         return []
-    largest, base = float(known.max()), quantity.partition(":")[0]
+    largest, base = float(magnitudes.max()), quantity.partition(":")[0]
     key = f"channels.{name}"
     if largest > LARGEST.get(base, np.inf):
         found = f"{largest:.4g} {kind.unit}"
         allowed = f"{LARGEST[base]:g} {kind.unit} at most; 'unit', 'range' or 'missing'?"
-        return [Fault(how.file[0], key, found, allowed)]
+        return [Fault(setup.file[0], key, found, allowed)]
     if 0.0 < largest < SMALLEST.get(base, 0.0):
         found = f"{largest:.4g} {kind.unit} at most"
-        return [Fault(how.file[0], key, found, "larger values; is its 'unit' another?")]
+        return [Fault(setup.file[0], key, found, "larger values; is its 'unit' another?")]
     return []
 
 
 def _measurement(
-    path: str, how: MeasurementFile, clock: Clock, values: dict[str, Floats], remarks: list[str]
+    path: str, setup: MeasurementFile, clock: Clock, values: dict[str, Floats], remarks: list[str]
 ) -> Measurement:
     axes = {
-        how.channels[name].quantity: _zeroed(path, name, how, values.pop(name), clock.time)
+        setup.channels[name].quantity: _zeroed(path, name, setup, values.pop(name), clock.time)
         for name in list(values)
-        if how.channels[name].quantity in ("distance", "mileage", "speed")
+        if setup.channels[name].quantity in ("distance", "mileage", "speed")
     }
     mileage = None
-    if "mileage" in axes and how.track is not None:
-        track = load_track(how.track)
+    if "mileage" in axes and setup.track is not None:
+        track = load_track(setup.track)
         mileage = track.mileage, track.falling_mileage
-    s, speed, said = position(path, how, clock.time, axes, mileage)
-    values = _mounted(path, how, values, remarks)
-    values = {name: _zeroed(path, name, how, x, clock.time) for name, x in values.items()}
-    return Measurement(how, clock.time, s, speed, values, (*remarks, *said))
+    s, speed, position_remarks = position(path, setup, clock.time, axes, mileage)
+    values = _mounted(path, setup, values, remarks)
+    values = {name: _zeroed(path, name, setup, x, clock.time) for name, x in values.items()}
+    return Measurement(setup, clock.time, s, speed, values, (*remarks, *position_remarks))
 
 
 def _mounted(
-    path: str, how: MeasurementFile, values: dict[str, Floats], remarks: list[str]
+    path: str, setup: MeasurementFile, values: dict[str, Floats], remarks: list[str]
 ) -> dict[str, Floats]:
     """Return the channels with the accelerations at points of `mounting` turned back.
 
@@ -234,9 +234,9 @@ def _mounted(
     f' + p x f' is what it would read along those of the body.  Axes that are not measured count
     as zero acceleration; of gravity a high pass leaves nothing.
     """
-    found = dict(values)
-    by_quantity = {how.channels[name].quantity: name for name in values}
-    for point, angles in how.mounting.items():
+    corrected = dict(values)
+    by_quantity = {setup.channels[name].quantity: name for name in values}
+    for point, angles in setup.mounting.items():
         quantities = {axis: f"sensor_acceleration:{point}:{axis}" for axis in "xyz"}
         names = {axis: by_quantity[q] for axis, q in quantities.items() if q in by_quantity}
         if not names:
@@ -249,8 +249,8 @@ def _mounted(
         at_rest = np.cross(np.array(angles), np.array([0.0, 0.0, -GRAVITY]))
         for k, axis in enumerate("xyz"):
             if axis in names:
-                constant = 0.0 if how.channels[names[axis]].high_pass else at_rest[k]
-                found[names[axis]] = values[names[axis]] + turned[:, k] + constant
+                constant = 0.0 if setup.channels[names[axis]].high_pass else at_rest[k]
+                corrected[names[axis]] = values[names[axis]] + turned[:, k] + constant
         if missing := [axis for axis in "xyz" if axis not in names]:
             remarks.append(f"{point}: {', '.join(missing)} is not measured, taken as zero.")
-    return found
+    return corrected
