@@ -56,11 +56,11 @@ class Noise:
 
     def at(self, wave_numbers: Floats, step: float) -> Floats:
         """Power for samples at a step [m], float64[k, component]."""
-        found = [np.interp(wave_numbers, self.wave_numbers, row) for row in self.power.T]
-        return np.asarray(np.transpose(found) * STEP / step + LEAST)
+        power = [np.interp(wave_numbers, self.wave_numbers, row) for row in self.power.T]
+        return np.asarray(np.transpose(power) * STEP / step + LEAST)
 
 
-def in_the_mean(
+def with_mean_contact(
     vehicle: Vehicle,
     track: Track,
     linear: LinearVehicle,
@@ -87,15 +87,15 @@ def in_the_mean(
     reach = float(np.max(np.abs(tangent.offsets))) + 2.0
     grid = np.arange(reach, float(s[-1]) - reach, STEP)
     k: Floats = 2.0 * np.pi * np.fft.rfftfreq(len(grid), STEP).astype(float)
-    moved = displacement(rough)
-    assert moved is not None  # it has irregularities
+    displacement_of = displacement(rough)
+    assert displacement_of is not None  # it has irregularities
     window = _window(len(grid))
 
     def spectrum(values: Floats) -> Complexes:
         return np.fft.rfft((values - values.mean()) * window)
 
     # alignment, level, cross level and gauge of y_left, z_left, y_right, z_right
-    u = np.stack([spectrum(row) for row in np.linalg.inv(RAILS.T) @ moved(grid)[0]])
+    u = np.stack([spectrum(row) for row in np.linalg.inv(RAILS.T) @ displacement_of(grid)[0]])
     x, places = _states(linear, tangent, result, lambda y: spectrum(on_grid(s, y, grid)))
     shift = np.exp(1j * k[:, None] * tangent.offsets)[:, :, None]
     shift = shift * (1j * k[:, None, None]) ** np.arange(ORDERS)
@@ -103,10 +103,10 @@ def in_the_mean(
     A, B = tangent.A.copy(), tangent.B.copy()
     hidden = np.setdiff1d(np.arange(len(A)), places)
     forcing = A[np.ix_(hidden, places)] @ x[places] + driven[hidden]
-    own = 1j * tangent.speed * k[:, None, None] * np.eye(len(hidden)) - A[np.ix_(hidden, hidden)]
-    x[hidden, 1:] = np.linalg.solve(own[1:], forcing.T[1:, :, None])[:, :, 0].T
+    system = 1j * tangent.speed * k[:, None, None] * np.eye(len(hidden)) - A[np.ix_(hidden, hidden)]
+    x[hidden, 1:] = np.linalg.solve(system[1:], forcing.T[1:, :, None])[:, :, 0].T
     # at rest, elements that keep their state have no equation
-    x[hidden, 0] = np.linalg.lstsq(own[0], forcing[:, 0], rcond=None)[0]
+    x[hidden, 0] = np.linalg.lstsq(system[0], forcing[:, 0], rcond=None)[0]
     inner = slice(int(TAPER / STEP), -int(TAPER / STEP))
     power = np.zeros((len(COMPONENTS), len(k)))
     common = np.zeros((len(COMPONENTS), len(k)), dtype=complex)
@@ -114,20 +114,20 @@ def in_the_mean(
     coordinates = linear.coordinates
     for w, b in enumerate(linear.model.system.contact.body):
         y, yaw = (coordinates.position_of[int(b), k] for k in (1, 5))
-        of = [y, yaw, int(tangent.rows[w, 0]), int(tangent.rows[w, 3])]
-        parts = x[of].copy()
+        states = [y, yaw, int(tangent.rows[w, 0]), int(tangent.rows[w, 3])]
+        parts = x[states].copy()
         parts[0] -= u[0] * shift[:, w, 0]
-        known = np.fft.irfft(parts, len(grid), axis=1)
-        amplitudes.append(known[0, inner].std())
+        motion = np.fft.irfft(parts, len(grid), axis=1)
+        amplitudes.append(motion[0, inner].std())
         for number, component in enumerate(COMPONENTS):
             row = tangent.rows[w, number]
-            found = spectrum(on_grid(s, result["body_acceleration"][:, b, component], grid))
-            rest = np.fft.irfft(found - tangent.A[row] @ x - driven[row], len(grid))
+            acceleration = spectrum(on_grid(s, result["body_acceleration"][:, b, component], grid))
+            rest = np.fft.irfft(acceleration - tangent.A[row] @ x - driven[row], len(grid))
             if component in (1, 5):
-                gain = np.linalg.lstsq(known[:, inner].T, rest[inner], rcond=None)[0]
-                A[row, of] += gain
+                gain = np.linalg.lstsq(motion[:, inner].T, rest[inner], rcond=None)[0]
+                A[row, states] += gain
                 B[row, w, 0, 0] -= gain[0]
-                rest = rest - gain @ known
+                rest = rest - gain @ motion
             own_part = np.fft.rfft(rest * window) / np.sqrt(np.sum(window**2))
             power[number] += np.abs(own_part) ** 2
             common[number] += own_part * np.conj(shift[:, w, 0])
@@ -158,8 +158,8 @@ def _states(
     first = result["body_position"]
     x = np.zeros((n, len(spectrum(first[:, 0, 0]))), dtype=complex)
     for i in places:
-        of = first if i < c.n_positions else result["body_velocity"]
-        x[i] = spectrum(of[:, c.bodies[i], c.components[i]])
+        source = first if i < c.n_positions else result["body_velocity"]
+        x[i] = spectrum(source[:, c.bodies[i], c.components[i]])
     return x, places
 
 

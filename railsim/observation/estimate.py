@@ -83,7 +83,7 @@ class Irregularity(Estimated):
 
         Those of the piece that explains least.
         """
-        found: dict[str, list[tuple[float, float]]] = {}
+        unseen: dict[str, list[tuple[float, float]]] = {}
         for number, name in enumerate(QUANTITIES):
             ranges: set[tuple[float, float]] = set()
             for piece in self.pieces:
@@ -93,8 +93,8 @@ class Irregularity(Estimated):
                 for first, last in stretches(dark):
                     waves = 2.0 * np.pi / k[last - 1], 2.0 * np.pi / k[first]
                     ranges.add((round(waves[0], 1), round(waves[1], 1)))
-            found[name] = _merged(sorted(ranges))
-        return found
+            unseen[name] = _merge_ranges(sorted(ranges))
+        return unseen
 
     def _forces(self) -> Iterator[tuple[str, Floats, Floats]]:
         return zip(self.outputs, self.forces, self.force_deviations, strict=True)
@@ -131,19 +131,19 @@ class Irregularity(Estimated):
     @property
     def notes(self) -> tuple[str, ...]:
         """What is not seen and where flanges touch, in sentences."""
-        said = []
+        sentences = []
         for name, ranges in self.unseen().items():
-            words = name.replace("_", " ")
+            label = name.replace("_", " ")
             if ranges:
-                spans = _listed([f"{a:g} to {b:g}" for a, b in ranges], "ranges")
-                said.append(f"Wavelengths not seen and not filled in, {words}: {spans}.")
+                spans = _list_text([f"{a:g} to {b:g}" for a, b in ranges], "ranges")
+                sentences.append(f"Wavelengths not seen and not filled in, {label}: {spans}.")
         for wheelset in dict.fromkeys(w for w, _, _ in self.flanges):
             ends = [(f"{a:.0f}", f"{b:.0f}") for w, a, b in self.flanges if w == wheelset]
             places = [a if a == b else f"{a} to {b}" for a, b in ends]
-            said.append(f"A flange of wheelset {wheelset} touches at s = "
-                        f"{_listed(places, 'places')}: the alignment there is less certain than "
+            sentences.append(f"A flange of wheelset {wheelset} touches at s = "
+                        f"{_list_text(places, 'places')}: the alignment there is less certain than "
                         "its interval says.")  # fmt: skip
-        return tuple(said)
+        return tuple(sentences)
 
     def record(self) -> dict[str, Any]:
         """Return the summary as plain data, SI."""
@@ -157,8 +157,8 @@ class Irregularity(Estimated):
 
     def recording(self) -> dict[str, Floats]:
         """Return the columns of a recording that a track of railsim reads [m]."""
-        kept = [q for q in range(len(LETTERS)) if np.any(self.values[q])]
-        return {"s": self.s, **{LETTERS[q]: self.values[q] for q in kept}}
+        rows = [q for q in range(len(LETTERS)) if np.any(self.values[q])]
+        return {"s": self.s, **{LETTERS[q]: self.values[q] for q in rows}}
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write the recording, a track with it, estimates and forces; return their paths."""
@@ -207,25 +207,25 @@ def estimate_of(
     names, response, base = forces
     outputs = np.einsum("kcq,qk->ck", response, spectra, optimize=True)
     rest = np.einsum("kcp,kpq,kcq->ck", response, covariance, response.conj(), optimize=True).real
-    own = covariance[:, range(number), range(number)].real.T
+    variance = covariance[:, range(number), range(number)].real.T
     power = power.T
     with np.errstate(invalid="ignore"):
-        seen = np.where(power > 0.0, 1.0 - own / np.where(power > 0.0, power, 1.0), 0.0)
-    kept = seen >= SEEN
-    error = np.where(kept, own, power)
-    found = np.where(kept, spectra[:number], 0.0)
+        seen = np.where(power > 0.0, 1.0 - variance / np.where(power > 0.0, power, 1.0), 0.0)
+    visible = seen >= SEEN
+    error = np.where(visible, variance, power)
+    found = np.where(visible, spectra[:number], 0.0)
 
-    def over(spectra: Complexes | Floats) -> Floats:
+    def irfft(spectra: Complexes | Floats) -> Floats:
         return np.fft.irfft(spectra, points, axis=1)[:, : len(piece.grid)]
 
     gains = {name: band_gain(band)(k / (2.0 * np.pi)) for name, band in BANDS.items()}
-    bands = {name: over(gain * found) for name, gain in gains.items()}
+    bands = {name: irfft(gain * found) for name, gain in gains.items()}
     deviations = {name: rms(gain**2 * error, points) for name, gain in gains.items()}
     return Estimate(
         s=piece.grid, speed=piece.speed,
-        values=over(found), deviations=rms(error, points), bands=bands, band_deviations=deviations,
+        values=irfft(found), deviations=rms(error, points), bands=bands, band_deviations=deviations,
         wave_numbers=k, seen=seen, power=power,
-        outputs=names, forces=over(outputs) + base, force_deviations=rms(rest, points),
+        outputs=names, forces=irfft(outputs) + base, force_deviations=rms(rest, points),
     )  # fmt: skip
 
 
@@ -234,7 +234,7 @@ def rms(power: Floats, points: int) -> Floats:
     return np.asarray(np.sqrt((2.0 * power.sum(axis=1) - power[:, 0] - power[:, -1]) / points))
 
 
-def joined(
+def join_pieces(
     name: str, vehicle: str, pieces: Sequence[Estimate], clearances: Floats, remarks: Sequence[str],
     track: Track,
 ) -> Irregularity:  # fmt: skip
@@ -243,35 +243,35 @@ def joined(
     begin, end = pieces[0].s[0], pieces[-1].s[-1]
     s = begin + step * np.arange(round((end - begin) / step) + 1)
 
-    def together(values: Sequence[Floats]) -> Floats:
+    def blend(values: Sequence[Floats]) -> Floats:
         """Join float64[rows, n] of each piece, or float64[rows]."""
-        found = np.zeros((len(values[0]), len(s)))
-        for number, (piece, own) in enumerate(zip(pieces, values, strict=True)):
+        total = np.zeros((len(values[0]), len(s)))
+        for number, (piece, rows) in enumerate(zip(pieces, values, strict=True)):
             inside = (s >= piece.s[0] - 1e-6) & (s <= piece.s[-1] + 1e-6)
-            at = s[inside]
-            whole = np.repeat(own[:, None], len(at), axis=1) if own.ndim == 1 else np.array(
-                [np.interp(at, piece.s, row) for row in own]
+            s_inside = s[inside]
+            whole = np.repeat(rows[:, None], len(s_inside), axis=1) if rows.ndim == 1 else np.array(
+                [np.interp(s_inside, piece.s, row) for row in rows]
             )  # fmt: skip
-            share = np.ones(len(at))
+            share = np.ones(len(s_inside))
             if number:
                 before = pieces[number - 1].s[-1]
-                share = np.clip((at - piece.s[0]) / (before - piece.s[0]), 0.0, 1.0)
-            found[:, inside] = (1.0 - share) * found[:, inside] + share * whole
-        return found
+                share = np.clip((s_inside - piece.s[0]) / (before - piece.s[0]), 0.0, 1.0)
+            total[:, inside] = (1.0 - share) * total[:, inside] + share * whole
+        return total
 
     whole = Estimated(
         s,
-        together([p.values for p in pieces]), together([p.deviations for p in pieces]),
-        {band: together([p.bands[band] for p in pieces]) for band in BANDS},
-        {band: together([p.band_deviations[band] for p in pieces]) for band in BANDS},
+        blend([p.values for p in pieces]), blend([p.deviations for p in pieces]),
+        {band: blend([p.bands[band] for p in pieces]) for band in BANDS},
+        {band: blend([p.band_deviations[band] for p in pieces]) for band in BANDS},
         pieces[0].outputs,
-        together([p.forces for p in pieces]), together([p.force_deviations for p in pieces]),
+        blend([p.forces for p in pieces]), blend([p.force_deviations for p in pieces]),
     )  # fmt: skip
     touching = []
     for w, clearance in enumerate(clearances):
         lateral = whole.forces[whole.outputs.index(f"lateral.{w + 1}")]
         places = [(s[a], s[b - 1]) for a, b in stretches(np.abs(lateral) > clearance)]
-        touching += [(w + 1, float(a), float(b)) for a, b in _merged(places, 1.0, NEAR)]
+        touching += [(w + 1, float(a), float(b)) for a, b in _merge_ranges(places, 1.0, NEAR)]
     return Irregularity(
         **vars(whole), name=name, vehicle=vehicle, pieces=tuple(pieces), flanges=tuple(touching),
         remarks=tuple(dict.fromkeys(remarks)), track=track,
@@ -287,20 +287,20 @@ def _share(piece: Estimate, number: int, band: tuple[float, float]) -> float:
     return float(np.sum(power * piece.seen[number, inside]) / total) if total else float("nan")
 
 
-def _merged(
-    ranges: Sequence[tuple[float, float]], factor: float = 1.05, apart: float = 0.0
+def _merge_ranges(
+    ranges: Sequence[tuple[float, float]], factor: float = 1.05, gap: float = 0.0
 ) -> list[tuple[float, float]]:
     """Return ranges that overlap or nearly touch as one: by a factor, or so far apart."""
-    found: list[tuple[float, float]] = []
+    merged: list[tuple[float, float]] = []
     for low, high in ranges:
-        if found and low <= factor * found[-1][1] + apart:
-            found[-1] = (found[-1][0], max(found[-1][1], high))
+        if merged and low <= factor * merged[-1][1] + gap:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
         else:
-            found.append((low, high))
-    return found
+            merged.append((low, high))
+    return merged
 
 
-def _listed(places: Sequence[str], kind: str) -> str:
+def _list_text(places: Sequence[str], kind: str) -> str:
     """Return the first places or ranges [m] in words, and how many more there are."""
     more = f" ({len(places)} {kind} in all)" if len(places) > LISTED else ""
     return f"{', '.join(places[:LISTED])} m{more}"

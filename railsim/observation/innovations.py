@@ -49,7 +49,7 @@ class Sizes:
         """Return what is assumed before the data are asked."""
         return cls(np.ones(len(KINDS)), np.full(channels, MODEL))
 
-    def of_contact(self, unknown: Floats) -> Floats:
+    def contact_powers(self, unknown: Floats) -> Floats:
         """Powers float64[k, component of all wheelsets] of these sizes."""
         factors = np.empty(sum(map(len, KINDS)))
         for kind, size in zip(KINDS, self.contact, strict=True):
@@ -72,7 +72,7 @@ class Powers:
     white: Floats  # noise and bias, float64[k, channel]
 
     @property
-    def own(self) -> Floats:
+    def signal(self) -> Floats:
         """Power of what channels read of the irregularities, float64[k, channel]."""
         H = self.response[:, :, : len(QUANTITIES)]
         return np.asarray(np.einsum("kcq,kq,kcq->kc", H, self.track, H.conj(), optimize=True).real)
@@ -84,27 +84,27 @@ class Powers:
 
     def fields(self, sizes: Sizes) -> Fields:
         """Fields of the smoother."""
-        power = np.hstack([self.track, sizes.of_contact(self.unknown)])
-        return Fields(self.points, power, self.response, self.white + sizes.model**2 * self.own)
+        power = np.hstack([self.track, sizes.contact_powers(self.unknown)])
+        return Fields(self.points, power, self.response, self.white + sizes.model**2 * self.signal)
 
 
-def spectra_of(signals: Floats, there: Flags, points: int) -> Complexes:
+def spectra_of(signals: Floats, valid: Flags, points: int) -> Complexes:
     """Spectra of signals with cosines at both ends, complex128[channel, k], as powers are."""
     n = signals.shape[1]
     ramp = np.minimum(1.0, np.minimum(np.arange(n), np.arange(n)[::-1]) * STEP / TAPER)
-    window = np.sin(0.5 * np.pi * ramp) ** 2 * there
-    count = np.maximum(there.sum(axis=1, keepdims=True), 1)
-    means = np.where(there, signals, 0.0).sum(axis=1, keepdims=True) / count
+    window = np.sin(0.5 * np.pi * ramp) ** 2 * valid
+    count = np.maximum(valid.sum(axis=1, keepdims=True), 1)
+    means = np.where(valid, signals, 0.0).sum(axis=1, keepdims=True) / count
     size = np.sqrt(np.sum(window**2, axis=1, keepdims=True) / points)
-    found = np.fft.rfft((signals - means) * window, points, axis=1)
-    return np.asarray(found / np.where(size > 0.0, size, 1.0))
+    spectra = np.fft.rfft((signals - means) * window, points, axis=1)
+    return np.asarray(spectra / np.where(size > 0.0, size, 1.0))
 
 
 def level_of(powers: Powers, spectra: Complexes) -> float:
     """Median over the channels of the rms that they read over the one that is expected."""
     bins = powers.track.any(axis=1)
     read = np.sum(np.abs(spectra[:, bins]) ** 2, axis=1) / powers.points
-    expected = np.sum(powers.own[bins] + powers.white[bins], axis=0)
+    expected = np.sum(powers.signal[bins] + powers.white[bins], axis=0)
     return float(np.median(np.sqrt(read / expected)))
 
 
@@ -114,15 +114,15 @@ def likely_sizes(powers: Powers, spectra: Complexes) -> Sizes:
     bins = np.flatnonzero(powers.track.any(axis=1))
     bins = bins[:: -(-len(bins) // MOST_BINS)]
     part = powers.part(bins, used)
-    y, own = spectra[used][:, bins].T / np.sqrt(powers.points), part.own
+    y, signal = spectra[used][:, bins].T / np.sqrt(powers.points), part.signal
     d = part.response[:, :, len(QUANTITIES) :]
     sizes = Sizes.assumed(len(used))
     for _ in range(STEPS):
         inverse = np.linalg.inv(part.fields(sizes).data_covariance())
         z = np.einsum("kcd,kd->kc", inverse, y)
-        found = np.sum(own * np.abs(z) ** 2, axis=0)
-        expected = np.sum(own * np.einsum("kcc->kc", inverse).real, axis=0)
-        model = sizes.model * (found / expected) ** 0.25
+        observed = np.sum(signal * np.abs(z) ** 2, axis=0)
+        expected = np.sum(signal * np.einsum("kcc->kc", inverse).real, axis=0)
+        model = sizes.model * (observed / expected) ** 0.25
         seen = np.sum(part.unknown * np.abs(np.einsum("kcj,kc->kj", d.conj(), z)) ** 2, axis=0)
         meant = np.einsum("kj,kcj,kcd,kdj->j", part.unknown, d.conj(), inverse, d, optimize=True)
         contact = sizes.contact.copy()
@@ -135,7 +135,7 @@ def likely_sizes(powers: Powers, spectra: Complexes) -> Sizes:
     return Sizes(sizes.contact, whole)
 
 
-def disagreeing(
+def disagreeing_channels(
     powers: Powers, piece: Piece, signals: Floats, names: list[str]
 ) -> tuple[set[int], list[str]]:
     """Channels that read another thing than the others say, and a remark on each.
@@ -144,30 +144,30 @@ def disagreeing(
     most.
     """
     points = powers.points
-    spectra = spectra_of(signals, piece.there, points)
+    spectra = spectra_of(signals, piece.valid, points)
     read = np.fft.irfft(spectra, points, axis=1)
     size = np.linalg.norm(read, axis=1)
-    wrong = set(np.flatnonzero(piece.there.any(axis=1) & (size < RESTS * size.max())).tolist())
-    left = [c for c in range(len(read)) if piece.there[c].any() and c not in wrong]
-    said = [f"{names[c]} rests: a dead sensor? It is left out." for c in sorted(wrong)]
-    most = len(wrong) + len(left) // 3
+    wrong = set(np.flatnonzero(piece.valid.any(axis=1) & (size < RESTS * size.max())).tolist())
+    remaining = [c for c in range(len(read)) if piece.valid[c].any() and c not in wrong]
+    remarks = [f"{names[c]} rests: a dead sensor? It is left out." for c in sorted(wrong)]
+    most = len(wrong) + len(remaining) // 3
     G = powers.fields(Sizes.assumed(len(names))).data_covariance()
-    while len(left) > FEWEST and len(wrong) < most:
-        inverse = np.linalg.inv(G[:, left][:, :, left])
-        own = np.einsum("kcc->ck", inverse).real
-        rest = np.einsum("kcd,dk->ck", inverse, spectra[left], optimize=True) / own
-        others = np.fft.irfft(spectra[left] - rest, points, axis=1)
-        beyond = np.mean(np.abs(rest) ** 2 * own, axis=1) / points
-        product = np.sum(read[left] * others, axis=1)
-        sizes = np.linalg.norm(read[left], axis=1), np.linalg.norm(others, axis=1)
+    while len(remaining) > FEWEST and len(wrong) < most:
+        inverse = np.linalg.inv(G[:, remaining][:, :, remaining])
+        precision = np.einsum("kcc->ck", inverse).real
+        residual = np.einsum("kcd,dk->ck", inverse, spectra[remaining], optimize=True) / precision
+        others = np.fft.irfft(spectra[remaining] - residual, points, axis=1)
+        beyond = np.mean(np.abs(residual) ** 2 * precision, axis=1) / points
+        product = np.sum(read[remaining] * others, axis=1)
+        sizes = np.linalg.norm(read[remaining], axis=1), np.linalg.norm(others, axis=1)
         worst = int(np.argmax(beyond))
-        name, c = names[left[worst]], product[worst] / (sizes[0] * sizes[1])[worst]
-        words = _disagreement(float(c), float((sizes[0] / sizes[1])[worst]), float(beyond[worst]))
-        if not words:
+        name, c = names[remaining[worst]], product[worst] / (sizes[0] * sizes[1])[worst]
+        reason = _disagreement(float(c), float((sizes[0] / sizes[1])[worst]), float(beyond[worst]))
+        if not reason:
             break
-        said.append(f"{name} {words} It is left out.")
-        wrong.add(left.pop(worst))
-    return wrong, said
+        remarks.append(f"{name} {reason} It is left out.")
+        wrong.add(remaining.pop(worst))
+    return wrong, remarks
 
 
 def _disagreement(c: float, ratio: float, beyond: float) -> str:

@@ -33,11 +33,11 @@ from railsim.measurement import Measurement
 from railsim.measurement.alignment import CURVATURES
 from railsim.measurement.counterpart import amplifier
 from railsim.observation import innovations
-from railsim.observation.contact import Noise, in_the_mean
-from railsim.observation.estimate import Estimate, Irregularity, estimate_of, joined, rms
+from railsim.observation.contact import Noise, with_mean_contact
+from railsim.observation.estimate import Estimate, Irregularity, estimate_of, join_pieces, rms
 from railsim.observation.innovations import KINDS, Powers, Sizes, likely_sizes, spectra_of
 from railsim.observation.pieces import MARGIN, READ, STEP, Piece, pieces_of, used_channels
-from railsim.observation.simulated import CHANGE, SimulatedRun, refined
+from railsim.observation.simulated import CHANGE, SimulatedRun, refine
 from railsim.observation.smoother import filtered
 from railsim.result.sensors import all_sensors
 from railsim.simulation.remarks import silent
@@ -93,13 +93,13 @@ class Assumed:
         spectrum, step = SPECTRA[self.spectrum], wave_numbers[1]
         ends = 2.0 * np.pi / np.array(self.wavelengths[::-1])
         low, high = np.clip([wave_numbers - 0.5 * step, wave_numbers + 0.5 * step], *ends)
-        found = np.zeros((len(wave_numbers), len(CHANNELS)))
+        power = np.zeros((len(wave_numbers), len(CHANNELS)))
         for number, channel in enumerate(CHANNELS):
             if channel in spectrum.channels:
                 factor = self.scale**2 * (CANT_BASE**2 if channel == "cross_level" else 1.0)
                 shares = spectrum.bin_variances(channel, low, high)
-                found[:, number] = 0.5 * points * factor * shares
-        return found
+                power[:, number] = 0.5 * points * factor * shares
+        return power
 
 
 def irregularity(
@@ -128,54 +128,54 @@ def irregularity(
         raise argument_error("simulations", f"found {simulations}", "0 or more")
     used = used_channels(measurement, all_sensors(vehicle))
     remarks = list(measurement.remarks)
-    if left := [name for name in measurement.channels if name not in used]:
-        remarks.append(f"Not used: {', '.join(left)}; the smoother reads accelerations.")
+    if unused := [name for name in measurement.channels if name not in used]:
+        remarks.append(f"Not used: {', '.join(unused)}; the smoother reads accelerations.")
     remarks += _other_curves(track, measurement, used)
     pieces = pieces_of(measurement, list(used))
     begin, end = measurement.distance[[0, -1]].tolist()
     if not is_uniform(track) and (begin < -MARGIN or end > track.length + MARGIN):
-        found_words, allowed = f"{begin:.0f} to {end:.0f} m", f"0 to {track.length:.0f} m"
+        found, allowed = f"{begin:.0f} to {end:.0f} m", f"0 to {track.length:.0f} m"
         allowed += f" as track '{track.name}' has it, on which the run is simulated"
-        raise input_error(measurement.name, found_words, allowed, "distance")
-    bare = track.replace(irregularities=[])
-    smooth = _Smooth(vehicle, bare, assumed, measurement, used, simulations)
-    found = []
+        raise input_error(measurement.name, found, allowed, "distance")
+    without = track.replace(irregularities=[])
+    smooth = _Smooth(vehicle, without, assumed, measurement, used, simulations)
+    estimates = []
     for number, piece in enumerate(pieces):
-        found.append(smooth.estimate(piece))
+        estimates.append(smooth.estimate(piece))
         if progress is not None:
             progress((number + 1) / len(pieces))
-    remarks += [*smooth.linear.remarks, *smooth.said]
+    remarks += [*smooth.linear.remarks, *smooth.remarks]
     if not simulations:
         remarks += _curves(track, measurement)
-    return joined(measurement.name, vehicle.name, found, smooth.flanges, remarks, bare)
+    return join_pieces(measurement.name, vehicle.name, estimates, smooth.flanges, remarks, without)
 
 
-def _other_curves(track: Track, read: Measurement, used: dict[str, str]) -> Iterator[str]:
+def _other_curves(track: Track, record: Measurement, used: dict[str, str]) -> Iterator[str]:
     """Remark where a record has not the curves or cants of the track, by means over `WINDOW`.
 
     Compared are kappa, where there is a channel of it, and v^2 kappa - g sin(cant angle) with the
     median of all accelerations in y, each of which has its own bias.
     """
-    s, v, plan = read.distance, np.maximum(read.speed, 1.0), Alignment(track)
-    turns = [read[n] / (v if n == "yaw_rate" else 1.0) for n in CURVATURES if n in read]
-    across = [read[n] for n in used if used[n].endswith(".y") and not read.channel(n).high_pass]
+    s, v, plan = record.distance, np.maximum(record.speed, 1.0), Alignment(track)
+    turns = [record[n] / (v if n == "yaw_rate" else 1.0) for n in CURVATURES if n in record]
+    across = [record[n] for n in used if used[n].endswith(".y") and not record.channel(n).high_pass]
     kappa = plan.curvature(s)
     steady = v**2 * kappa - GRAVITY * np.sin(plan.cant_angle(s))
     edges = np.searchsorted(s, np.arange(s[0], s[-1], WINDOW)).tolist()
-    for words, channels, of_track, most in (
+    for text, channels, of_track, most in (
         ("curvature of {:.2g} 1/m", turns[:1], kappa, MOST_CURVATURE),
         ("lateral acceleration of {:.2g} m/s2", across, steady, MOST_Y),
     ):
         rows = [slice(*ends) for ends in pairwise(edges) if channels]
-        means = [[m for x in channels if np.isfinite(m := float(np.mean(x[one])))] for one in rows]
-        own = np.array([np.median(np.array(values or [np.nan])) for values in means])
-        off = own - np.array([np.mean(of_track[one]) for one in rows])
+        means = [[m for x in channels if np.isfinite(m := float(np.mean(x[row])))] for row in rows]
+        read = np.array([np.median(np.array(values or [np.nan])) for values in means])
+        off = read - np.array([np.mean(of_track[row]) for row in rows])
         if len(far := np.flatnonzero(np.abs(off) > most)):
             k = far[np.argmax(np.abs(off[far]))]
-            at, has = f"s = {s[edges[k]]:.0f} to {s[edges[k + 1]]:.0f} m", own[k] - off[k] + 0.0
+            place, has = f"s = {s[edges[k]]:.0f} to {s[edges[k + 1]]:.0f} m", read[k] - off[k] + 0.0
             yield (
-                f"The record is not of the curves and cants of track '{track.name}': at {at} it "
-                f"has a {words.format(own[k])} in the mean, the track one of {has:.2g}; they "
+                f"The record is not of the curves and cants of track '{track.name}': at {place} it "
+                f"has a {text.format(read[k])} in the mean, the track one of {has:.2g}; they "
                 f"differ by more than {most:g} in {len(far)} of {len(rows)} such lengths."
             )
 
@@ -205,7 +205,7 @@ class _Smooth:
         self.simulations, self.name = simulations, measurement.name
         begin, end = measurement.distance[[0, -1]].tolist()
         self.linear = LinearVehicle(vehicle, track, at=0.5 * (begin + end))
-        self.channels, self.used, self.known = list(used), list(used.values()), all_sensors(vehicle)
+        self.channels, self.used = list(used), list(used.values())
         self.filters = [measurement.channel(name) for name in used]
         kinds = [measurement.quantities[name].split(":")[0] for name in used]
         default = {**NOISE, "sensor_acceleration": assumed.noise}
@@ -216,18 +216,18 @@ class _Smooth:
         self.bias = np.array([bias[kind] for kind in kinds])
         self._alignment = Alignment(track)
         self.model = cache(self._model)
-        self.said: list[str] = []  # on pieces, and channels that read what they should not
+        self.remarks: list[str] = []  # on pieces, and channels that read what they should not
         self._wrong: set[int] | None = None
         self.flanges = _flanges(self.linear, track)
         self._last: tuple[tuple[float, ...], Complexes] | None = None
 
     def _model(self, speed: float, curvature: float, cant: float) -> tuple[TrackResponse, Noise]:
         """Linear vehicle and noise of its state at a speed [m/s], in a curve [1/m, m]."""
-        tangent, a = track_response(self.linear, self.known, speed), self.assumed
+        tangent, a = track_response(self.linear, all_sensors(self.vehicle), speed), self.assumed
         rough = {"spectrum": a.spectrum, "wavelengths": list(a.wavelengths), "scale": a.scale}
         curve = curvature, cant
         with silent():
-            return in_the_mean(self.vehicle, self.track, self.linear, tangent, rough, curve)
+            return with_mean_contact(self.vehicle, self.track, self.linear, tangent, rough, curve)
 
     def _sharpest(self, piece: Piece) -> tuple[float, float]:
         """Curvature and cant where a piece is sharpest [1/m, m], three digits."""
@@ -238,9 +238,9 @@ class _Smooth:
         cant = CANT_BASE * np.sin(self._alignment.cant_angle(piece.grid[k : k + 1])[0])
         return float(f"{curvature[k]:.3g}"), float(f"{cant:.3g}")
 
-    def _response(self, response: TrackResponse, k: Floats, at: tuple[float, ...]) -> Complexes:
+    def _response(self, response: TrackResponse, k: Floats, key_of: tuple[float, ...]) -> Complexes:
         """H of all outputs, that of a constant left out; the last one is kept."""
-        key = *at, len(k)
+        key = *key_of, len(k)
         if self._last is None or self._last[0] != key:
             shape = len(k), len(response.outputs), len(QUANTITIES) + response.rows.size
             H = np.zeros(shape, complex)
@@ -277,24 +277,24 @@ class _Smooth:
             if isinstance(smooth, str):
                 raise ModelError(f"the run over the track without irregularities: {smooth}")
             read, base = read - smooth.channels, smooth.forces
-        there = self._there(powers, piece, read)
-        sizes = likely_sizes(powers, spectra_of(read, there, points))
+        valid = self._valid_samples(powers, piece, read)
+        sizes = likely_sizes(powers, spectra_of(read, valid, points))
         # what the contact leaves out goes with the irregularities: its size does not show yet
         fields = powers.fields(replace(sizes, contact=np.ones(len(KINDS))))
         covariance = fields.covariance()
         padded = (0, 0), (0, points - n)
-        mean = fields.mean(np.pad(read, padded), np.pad(there, padded))
+        mean = fields.mean(np.pad(read, padded), np.pad(valid, padded))
         if self.simulations:
-            found = self._refined(piece, run, powers, sizes, whole[:, forces], mean, there)
-            covariance, mean, base = found or (covariance, mean, base)
+            outcome = self._refine(piece, run, powers, sizes, whole[:, forces], mean, valid)
+            covariance, mean, base = outcome or (covariance, mean, base)
         return estimate_of(
             piece, np.fft.rfft(mean, axis=1), covariance, powers.track,
             (names, whole[:, forces], base),
         )  # fmt: skip
 
-    def _refined(
+    def _refine(
         self, piece: Piece, run: SimulatedRun, powers: Powers, sizes: Sizes, forces: Complexes,
-        mean: Floats, there: Flags,
+        mean: Floats, valid: Flags,
     ) -> tuple[Complexes, Floats, Floats] | None:  # fmt: skip
         """Fields about the simulated run that agrees with the measured one.
 
@@ -305,54 +305,54 @@ class _Smooth:
         n, points, count = len(piece.grid), powers.points, len(QUANTITIES)
         H = powers.response[:, :, :count]
         gain = powers.fields(replace(sizes, contact=np.full(len(KINDS), REMAINDER))).gain(count)
-        found = refined(
+        outcome = refine(
             run, lambda data: filtered(gain, data), lambda r: filtered(H, r),
-            (piece.signals, there), (mean[:count], rms(powers.track.T, points)), self.simulations,
+            (piece.signals, valid), (mean[:count], rms(powers.track.T, points)), self.simulations,
         )  # fmt: skip
         place = f"s = {piece.grid[0]:.0f} to {piece.grid[-1]:.0f} m"
-        if isinstance(found, str):
-            self.said.append(f"{place}: the run simulated on the linear estimate is {found}. "
+        if isinstance(outcome, str):
+            self.remarks.append(f"{place}: the run simulated on the linear estimate is {outcome}. "
                              "The linear estimate is given.")  # fmt: skip
             return None
-        if found.change > CHANGE:
-            self.said.append(
+        if outcome.change > CHANGE:
+            self.remarks.append(
                 f"{place}: after {self.simulations} simulated runs the irregularities still change "
-                f"by {found.change:.2g} of what is assumed for them ({CHANGE:g} asked)."
+                f"by {outcome.change:.2g} of what is assumed for them ({CHANGE:g} asked)."
             )
-        sizes = likely_sizes(powers, spectra_of(found.data[:, :n], there, points))
+        sizes = likely_sizes(powers, spectra_of(outcome.data[:, :n], valid, points))
         fields = powers.fields(sizes)
-        mean = filtered(fields.gain(fields.power.shape[1]), found.data)
+        mean = filtered(fields.gain(fields.power.shape[1]), outcome.data)
         # the data agree with the run, but the contact about it is not the one in the mean
         blunt = np.maximum(sizes.contact, (LOCAL, 0.0))
         covariance = powers.fields(replace(sizes, contact=blunt)).covariance()
-        own = np.arange(count)
-        covariance[:, own, own] += found.change**2 * powers.track
-        base = found.reading.forces - filtered(forces[:, :, :count], found.fields)[:, :n]
+        index = np.arange(count)
+        covariance[:, index, index] += outcome.change**2 * powers.track
+        base = outcome.reading.forces - filtered(forces[:, :, :count], outcome.fields)[:, :n]
         return covariance, mean, base
 
-    def _there(self, powers: Powers, piece: Piece, read: Floats) -> Flags:
+    def _valid_samples(self, powers: Powers, piece: Piece, read: Floats) -> Flags:
         """Where the channels say something; the first piece tells which of them are wrong."""
         if self._wrong is None:
-            level = innovations.level_of(powers, spectra_of(read, piece.there, powers.points))
+            level = innovations.level_of(powers, spectra_of(read, piece.valid, powers.points))
             if not 1.0 / LEVEL < level < LEVEL:
                 found = f"{level:.3g} times what the vehicle reads on '{self.assumed.spectrum}'"
                 allowed = f"1/{LEVEL:g} to {LEVEL:g} times; the 'unit' of all channels, or 'scale'?"
                 raise input_error(self.name, found, allowed, "channels")
-            self._wrong, said = innovations.disagreeing(powers, piece, read, self.channels)
-            self.said += said
-        there = piece.there.copy()
-        there[list(self._wrong)] = False
-        return there
+            self._wrong, said = innovations.disagreeing_channels(powers, piece, read, self.channels)
+            self.remarks += said
+        valid = piece.valid.copy()
+        valid[list(self._wrong)] = False
+        return valid
 
 
 def _flanges(linear: LinearVehicle, track: Track) -> Floats:
     """Lateral displacement of each wheelset at which a flange touches [m]; inf where unknown."""
-    bodies, found = {body.name: body for body in linear.model.flat.bodies}, []
+    bodies, clearances = {body.name: body for body in linear.model.flat.bodies}, []
     for b in linear.model.system.contact.body:
         wheelset = bodies[linear.model.index.bodies[int(b)]].wheelset
         assert wheelset is not None  # it has contacts
         geometry = geometry_of(wheelset, track, linear.model.profiles)
         steep = [] if geometry is None else np.abs(
             geometry.lateral[np.nanmax(geometry.contact_angle, axis=1) > FLANGE])  # fmt: skip
-        found.append(float(np.min(steep, initial=np.inf)))
-    return np.array(found)
+        clearances.append(float(np.min(steep, initial=np.inf)))
+    return np.array(clearances)

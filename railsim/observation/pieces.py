@@ -26,12 +26,12 @@ SHAPE = 8.0  # of its window, Kaiser's: 80 dB
 class Piece:
     """Part of a run at a nearly constant speed.
 
-    `signals`, `there` (float64[channel, n]): What the channels read, and where they do.
+    `signals`, `valid` (float64[channel, n]): What the channels read, and where they do.
     """
 
     grid: Floats  # arc length of the reference body, equal steps [m], float64[n]
     signals: Floats
-    there: Flags
+    valid: Flags
     speeds: Floats  # [m/s], float64[n]
     rate: float  # values of the record per second [1/s]
 
@@ -41,17 +41,17 @@ class Piece:
         return float(f"{np.mean(self.speeds):.3g}")
 
 
-def used_channels(measurement: Measurement, known: dict[str, Any]) -> dict[str, str]:
+def used_channels(measurement: Measurement, sensors: dict[str, Any]) -> dict[str, str]:
     """Outputs of the linear vehicle by channel: ``axlebox_1_left.z``."""
     used, faults = {}, Faults()
     for name, quantity in measurement.quantities.items():
         kind, *labels = quantity.split(":")
         if kind not in READ:
             continue
-        if labels[0] not in known:
+        if labels[0] not in sensors:
             found = f"the vehicle has no sensor '{labels[0]}'"
             key = f"channels.{name}.quantity"
-            faults.append(Fault(measurement.name, key, found, nearest(labels[0], known)))
+            faults.append(Fault(measurement.name, key, found, nearest(labels[0], sensors)))
             continue
         used[name] = f"{labels[0]}.{labels[1] if len(labels) > 1 else 'roll_rate'}"
     if not used and not faults:
@@ -93,10 +93,10 @@ def on_grid(s: Floats, values: Floats, grid: Floats) -> Floats:
     `s`, `values` (float64[n]): Rising arc lengths at nearly equal steps [m], and values there.
     `grid` (float64[m]): Equal steps [m].
     """
-    step, own = grid[1] - grid[0], float(np.median(np.diff(s)))
-    if own < step:
-        n = 2 * int(HALF * step / own) + 1
-        taps, pad = firwin(n, own / step, window=("kaiser", SHAPE)), n // 2
+    step, spacing = grid[1] - grid[0], float(np.median(np.diff(s)))
+    if spacing < step:
+        n = 2 * int(HALF * step / spacing) + 1
+        taps, pad = firwin(n, spacing / step, window=("kaiser", SHAPE)), n // 2
         ends = 2.0 * values[0] - values[pad:0:-1], 2.0 * values[-1] - values[-2 : -pad - 2 : -1]
         values = oaconvolve(np.concatenate([ends[0], values, ends[1]]), taps, mode="valid")
     return np.asarray(CubicSpline(s, values)(grid))
@@ -106,21 +106,21 @@ def _piece(measurement: Measurement, names: list[str], begin: float, end: float)
     reach = HALF * STEP + 1.0
     part = measurement.part(begin - reach, end + reach)
     grid: Floats = begin + STEP * np.arange(int((end - begin) / STEP) + 1, dtype=np.float64)
-    signals, there = [], []
+    signals, valid = [], []
     for name in names:
         x = part[name]
-        unknown = np.isnan(x)
+        missing = np.isnan(x)
         lost = np.zeros(len(grid), dtype=bool)
-        if unknown.all():
+        if missing.all():
             signals.append(np.zeros(len(grid)))
-            there.append(lost)
+            valid.append(lost)
             continue
-        if unknown.any():
-            x = np.interp(part.distance, part.distance[~unknown], x[~unknown])
-            near = np.searchsorted(grid, part.distance[unknown])
+        if missing.any():
+            x = np.interp(part.distance, part.distance[~missing], x[~missing])
+            near = np.searchsorted(grid, part.distance[missing])
             lost[np.clip(near, 0, len(grid) - 1)] = True
             lost = np.convolve(lost, np.ones(2 * AROUND_GAP + 1), mode="same") > 0
         signals.append(on_grid(part.distance, x, grid))
-        there.append(~lost)
+        valid.append(~lost)
     speeds = np.interp(grid, part.distance, part.speed)
-    return Piece(grid, np.array(signals), np.array(there), speeds, measurement.rate)
+    return Piece(grid, np.array(signals), np.array(valid), speeds, measurement.rate)

@@ -104,8 +104,8 @@ class SimulatedRun:
         ahead = STEP * (points - len(s))
         share = np.interp(places, [s[0] - ahead, s[0], s[-1], s[-1] + AFTER], [0.0, 1.0, 1.0, 0.0])
         on_rails = (RAILS.T @ fields)[:, np.rint((places - s[0]) / STEP).astype(int) % points]
-        moved = np.vstack([places, share * on_rails]).T.tolist()
-        irregularity = {"type": "measured", "rows": moved, "fade": 0.0}
+        rows_moved = np.vstack([places, share * on_rails]).T.tolist()
+        irregularity = {"type": "measured", "rows": rows_moved, "fade": 0.0}
         changes: dict[str, Any] = {"irregularities": [irregularity]}
         end = float(s[-1]) + 0.5 * AFTER
         if self._uniform:
@@ -123,9 +123,9 @@ class SimulatedRun:
         rate = (len(result["time"]) - 1) / float(result["time"][-1] - result["time"][0])
         rows = [amplified(_series(result, name), rate, c) for name, c in self.outputs.items()]
         rows += [_series(result, name) for name in self.forces]
-        at = result["distance"] + self._moved
-        both = np.array([on_grid(at, x, self.piece.grid) for x in rows])
-        return Reading(both[: len(self.outputs)], both[len(self.outputs) :])
+        run_places = result["distance"] + self._moved
+        series = np.array([on_grid(run_places, x, self.piece.grid) for x in rows])
+        return Reading(series[: len(self.outputs)], series[len(self.outputs) :])
 
     def _settings(self, s: Floats) -> Settings:
         if self._constant:
@@ -155,50 +155,50 @@ Map = Callable[[Floats], Floats]
 Pair = tuple[Floats, Floats]
 
 
-def refined(
-    run: Run, gain: Map, seen: Map, data: tuple[Floats, Flags], first: Pair, most: int
+def refine(
+    run: Run, gain: Map, response: Map, data: tuple[Floats, Flags], first: Pair, most: int
 ) -> Refined | str:
     """Solve (1), starting from the linear estimate.
 
-    `run`: float64[quantity, points] to what is read on the n of the grid. `gain`, `seen`: K and H:
+    `run`: float64[quantity, points] to what is read on the n of the grid. `gain`, `response`: K, H:
     float64[channel, points] to float64[quantity, points] and back. `data` (float64[channel, n]):
     y, and where it exists.  A constant in it is the channel's, not the track's. `first`,
     `deviations` (float64[quantity, points]): Irregularities to begin with, and what they are
     measured with [m]. `most`: Number of runs. Returns: The best step; why the first run was not
     complete.
     """
-    y, there = data
+    y, valid = data
     r, deviations = first
     scale = np.where(deviations > 0.0, deviations, np.inf)[:, None]
     n = y.shape[1]
-    tried: list[Floats] = []
+    guesses: list[Floats] = []
     residuals: list[Floats] = []
     best: Refined | str = "not there"
     for _ in range(most):
         reading = run(r)
         if isinstance(reading, str):
             return reading if isinstance(best, str) else best
-        rest = np.where(there, y - reading.channels, 0.0)
-        count = np.maximum(there.sum(axis=1, keepdims=True), 1)
-        read = np.array(seen(r))
-        read[:, :n] += np.where(there, rest - rest.sum(axis=1, keepdims=True) / count, 0.0)
-        left = (gain(read) - r) / scale
-        change = float(np.sqrt(np.mean(left[:, :n] ** 2, axis=1)).max())
+        rest = np.where(valid, y - reading.channels, 0.0)
+        count = np.maximum(valid.sum(axis=1, keepdims=True), 1)
+        read = np.array(response(r))
+        read[:, :n] += np.where(valid, rest - rest.sum(axis=1, keepdims=True) / count, 0.0)
+        residual = (gain(read) - r) / scale
+        change = float(np.sqrt(np.mean(residual[:, :n] ** 2, axis=1)).max())
         if isinstance(best, str) or change < best.change:
             best = Refined(r, reading, read, change)
         if change < CHANGE:
             return best
-        tried, residuals = [*tried, r / scale][-KEPT:], [*residuals, left][-KEPT:]
-        r = np.where(np.isfinite(scale), scale, 0.0) * _mixed(tried, residuals)
+        guesses, residuals = [*guesses, r / scale][-KEPT:], [*residuals, residual][-KEPT:]
+        r = np.where(np.isfinite(scale), scale, 0.0) * _mixed_step(guesses, residuals)
     return best
 
 
-def _mixed(tried: list[Floats], residuals: list[Floats]) -> Floats:
+def _mixed_step(guesses: list[Floats], residuals: list[Floats]) -> Floats:
     """Next step: of the mixture with the least residual, with a share of that residual."""
-    if len(tried) == 1:
-        return tried[0] + SHARE * residuals[0]
-    moved = np.diff(np.reshape(tried, (len(tried), -1)), axis=0).T
-    changed = np.diff(np.reshape(residuals, (len(tried), -1)), axis=0).T
+    if len(guesses) == 1:
+        return guesses[0] + SHARE * residuals[0]
+    moved = np.diff(np.reshape(guesses, (len(guesses), -1)), axis=0).T
+    changed = np.diff(np.reshape(residuals, (len(guesses), -1)), axis=0).T
     weights = np.linalg.lstsq(changed, residuals[-1].ravel(), rcond=1e-8)[0]
     step = SHARE * residuals[-1].ravel() - (moved + SHARE * changed) @ weights
-    return np.asarray(tried[-1] + step.reshape(tried[-1].shape))
+    return np.asarray(guesses[-1] + step.reshape(guesses[-1].shape))

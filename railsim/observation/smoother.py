@@ -58,42 +58,42 @@ class Fields:
         P, H = self.power[:, :fields], self.response[:, :, :fields]
         return np.asarray(np.einsum("kp,kcp,kcd->kpd", P, H.conj(), self._inverse(), optimize=True))
 
-    def mean(self, data: Floats, there: Flags | None = None, residual: float = RESIDUAL) -> Floats:
+    def mean(self, data: Floats, valid: Flags | None = None, residual: float = RESIDUAL) -> Floats:
         """E[r | y] of (2), float64[field, points].
 
-        `data` (float64[channel, points]): Samples; those that do not exist do not count. `there`
+        `data` (float64[channel, points]): Samples; those that do not exist do not count. `valid`
         (bool[channel, points]): Which samples exist; all by default. `residual`: Of the equations,
         over the rms of the errors. Raises ModelError: The equations are not solved after
         `MOST_ITERATIONS`.
         """
-        there = np.ones_like(data, dtype=bool) if there is None else there
-        weights = np.fft.rfft(self._weights(data, there, residual), axis=1)
+        valid = np.ones_like(data, dtype=bool) if valid is None else valid
+        weights = np.fft.rfft(self._weights(data, valid, residual), axis=1)
         back = np.einsum("kcq,ck->qk", self.response.conj(), weights, optimize=True)
         return np.asarray(np.fft.irfft(self.power.T * back, self.points, axis=1))
 
-    def _weights(self, data: Floats, there: Flags, residual: float) -> Floats:
+    def _weights(self, data: Floats, valid: Flags, residual: float) -> Floats:
         """Weights of the samples, w of (2), zero where no sample exists."""
         forth, back = self.data_covariance(), self._inverse()
 
-        def applied(matrix: Complexes, values: Floats) -> Floats:
-            return np.where(there, filtered(matrix, values), 0.0)
+        def apply(matrix: Complexes, values: Floats) -> Floats:
+            return np.where(valid, filtered(matrix, values), 0.0)
 
-        data = np.where(there, data, 0.0)
-        if there.all():
-            return applied(back, data)
+        data = np.where(valid, data, 0.0)
+        if valid.all():
+            return apply(back, data)
         scale = 1.0 / np.sqrt(np.median(self.errors, axis=0))[:, None]
-        w = applied(back, data)
-        rest = data - applied(forth, w)
-        goal = residual * np.sqrt(np.count_nonzero(there))
-        z = applied(back, rest)
+        w = apply(back, data)
+        rest = data - apply(forth, w)
+        goal = residual * np.sqrt(np.count_nonzero(valid))
+        z = apply(back, rest)
         along, size = z, np.vdot(rest, z)
         for _ in range(MOST_ITERATIONS):
             if np.linalg.norm(scale * rest) <= goal:
                 return w
-            image = applied(forth, along)
+            image = apply(forth, along)
             step = size / np.vdot(along, image)
             w, rest = w + step * along, rest - step * image
-            z = applied(back, rest)
+            z = apply(back, rest)
             before, size = size, np.vdot(rest, z)
             along = z + (size / before) * along
         raise ModelError(
@@ -103,9 +103,9 @@ class Fields:
     def data_covariance(self) -> Complexes:
         """G of (1), complex128[bin, channel, channel]."""
         H, channels = self.response, np.arange(self.errors.shape[1])
-        found = np.einsum("kcq,kq,kdq->kcd", H, self.power, H.conj(), optimize=True)
-        found[:, channels, channels] += self.errors
-        return np.asarray(found)
+        covariance = np.einsum("kcq,kq,kdq->kcd", H, self.power, H.conj(), optimize=True)
+        covariance[:, channels, channels] += self.errors
+        return np.asarray(covariance)
 
     def _inverse(self) -> Complexes:
         """G^-1, complex128[bin, channel, channel]."""

@@ -80,7 +80,7 @@ def test_contact_of_a_recording_car_is_that_of_where_it_recorded(monkeypatch, co
     as_on_the_straight(
         ran_on(
             monkeypatch, contact,
-            lambda: contact.in_the_mean(coach, track, linear, tangent, rough),
+            lambda: contact.with_mean_contact(coach, track, linear, tangent, rough),
         )
     )  # fmt: skip
 

@@ -6,10 +6,10 @@ import pytest
 import railsim
 from railsim.definitions.excitations.base import CHANNELS
 from railsim.observation import Assumed, simulated
-from railsim.observation.estimate import _merged
+from railsim.observation.estimate import _merge_ranges
 from railsim.observation.innovations import Powers, likely_sizes, spectra_of
 from railsim.observation.pieces import STEP, Piece
-from railsim.observation.simulated import CHANGE, Reading, SimulatedRun, _series, refined
+from railsim.observation.simulated import CHANGE, Reading, SimulatedRun, _series, refine
 
 N = 400
 
@@ -27,7 +27,7 @@ def solved(law, most=40):
     """Channels read law(r); the linear response is r, the gain nearly its inverse."""
     truth = smooth()
     y = law(truth)
-    return truth, refined(
+    return truth, refine(
         lambda r: Reading(law(r), np.empty((0, N))),
         lambda data: data / 1.001,
         lambda r: r,
@@ -62,7 +62,7 @@ def test_gaps_and_constants_of_the_data_change_nothing():
     there = np.ones(truth.shape, dtype=bool)
     there[0, 100:180] = there[1, 50:60] = False
     y = np.where(there, truth + np.array([[5.0], [-3.0]]), 1e3)
-    found = refined(
+    found = refine(
         lambda r: Reading(1.0 * r, np.empty((0, N))), lambda data: data, lambda r: r,
         (y, there), (np.zeros_like(y), np.ones(2)), 40,
     )  # fmt: skip
@@ -72,7 +72,7 @@ def test_gaps_and_constants_of_the_data_change_nothing():
 
 
 def test_a_run_that_ends_early_is_said():
-    found = refined(
+    found = refine(
         lambda r: "derailed: wheelset 1", lambda y: y, lambda r: r,
         (np.zeros((2, N)), np.ones((2, N), dtype=bool)), (np.zeros((2, N)), np.ones(2)), 5,
     )  # fmt: skip
@@ -190,7 +190,7 @@ def test_a_speed_is_constant_within_a_hundredth_of_its_mean(spread, steady):
 )
 def test_ranges_that_nearly_touch_are_one(own, apart, one):
     """Waves by a twentieth of their length, places by a distance; one within another adds none."""
-    found = _merged([(1.0, 2.0), (1.2, 1.5), (apart, 4.0)], *own)
+    found = _merge_ranges([(1.0, 2.0), (1.2, 1.5), (apart, 4.0)], *own)
     assert found == ([(1.0, 4.0)] if one else [(1.0, 2.0), (apart, 4.0)])
 
 

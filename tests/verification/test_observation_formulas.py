@@ -13,12 +13,12 @@ from railsim.linear.track_response import QUANTITIES, TrackResponse
 from railsim.measurement import load_measurement
 from railsim.observation import contact, irregularity
 from railsim.observation.contact import Noise, _smoothed
-from railsim.observation.estimate import BANDS, Estimate, estimate_of, joined
+from railsim.observation.estimate import BANDS, Estimate, estimate_of, join_pieces
 from railsim.observation.innovations import (
     Powers,
     Sizes,
     _disagreement,
-    disagreeing,
+    disagreeing_channels,
     level_of,
     spectra_of,
 )
@@ -81,7 +81,7 @@ def test_pieces_cover_a_run_but_its_ends_and_keep_their_speed(length, slow, gain
         assert extent <= 2000.0 + 100.0 + STEP
         ratio = one.speeds.max() / one.speeds.min()
         assert ratio < 1.061 or extent < 300.0 + 100.0 + STEP
-        known = one.there[0]
+        known = one.valid[0]
         beside = np.abs(one.grid - 401.0) < 1.0 + 8.0 * STEP - 0.1
         assert not known[beside].any()
         assert known[np.abs(one.grid - 401.0) > 1.0 + 10.0 * STEP].all()
@@ -89,7 +89,7 @@ def test_pieces_cover_a_run_but_its_ends_and_keep_their_speed(length, slow, gain
         far = np.abs(one.grid - 401.0) > 12.0
         np.testing.assert_allclose(one.signals[0][far], wave[far], atol=5e-3)
         assert not one.signals[1].any()
-        assert not one.there[1].any()
+        assert not one.valid[1].any()
 
 
 @pytest.mark.parametrize(("wave", "passed"), [(0.4, 0.0), (0.9, 1.0), (5.0, 1.0), (0.5, 0.5)])
@@ -159,9 +159,9 @@ def test_the_channel_that_the_others_contradict_is_named(wrong, change, words):
     assert level_of(given, loud) == pytest.approx(7.0, rel=0.25)
     if wrong is not None:
         read[wrong] = change(read[wrong])
-    piece = SimpleNamespace(there=np.ones(read.shape, dtype=bool))
+    piece = SimpleNamespace(valid=np.ones(read.shape, dtype=bool))
     names = [f"channel {c}" for c in range(5)]
-    found, said = disagreeing(given, piece, read, names)
+    found, said = disagreeing_channels(given, piece, read, names)
     assert found == (set() if wrong is None else {wrong})
     assert len(said) == len(found)
     if wrong is not None:
@@ -196,8 +196,8 @@ def test_of_three_channels_none_can_be_said_to_be_the_wrong_one(reading, found):
     read[2] = -read[2]
     there = np.ones(read.shape, dtype=bool)
     there[reading:] = False
-    piece = SimpleNamespace(there=there)
-    assert disagreeing(given, piece, read, [f"channel {c}" for c in range(5)])[0] == found
+    piece = SimpleNamespace(valid=there)
+    assert disagreeing_channels(given, piece, read, [f"channel {c}" for c in range(5)])[0] == found
 
 
 def test_powers_of_sizes_are_those_of_their_parts():
@@ -210,7 +210,7 @@ def test_powers_of_sizes_are_those_of_their_parts():
     fields = given.fields(Sizes(np.array([3.0, 7.0]), model))
     assert fields.power[:, 4:] == pytest.approx(unknown * np.tile([3.0, 7.0, 7.0, 3.0], 2))
     own = np.sum(np.abs(given.response[:, :, :4]) ** 2 * given.track[:, None], axis=2)
-    assert given.own == pytest.approx(own)
+    assert given.signal == pytest.approx(own)
     assert fields.errors == pytest.approx(given.white + model**2 * own)
 
 
@@ -286,7 +286,7 @@ def test_contact_in_the_mean_of_a_run_with_linear_contact_is_that_contact(monkey
     )
     rough = {"spectrum": "erri_b176_high", "wavelengths": [3.0, 100.0]}
     track = load_track("straight")
-    found, noise = contact.in_the_mean(None, track, linear, tangent, rough)
+    found, noise = contact.with_mean_contact(None, track, linear, tangent, rough)
     expected, inputs = A.copy(), B.copy()
     for w in range(2):
         states = 4 * w + np.array([0, 3, 8, 11])
@@ -364,7 +364,7 @@ def made_irregularity(random):
         wave_numbers=k, seen=seen, power=power, outputs=names, forces=forces,
         force_deviations=np.array([300.0, 200.0, 1e-4]),
     )  # fmt: skip
-    return piece, joined("run", "coach", [piece], np.array([1.0]), (), load_track("straight"))
+    return piece, join_pieces("run", "coach", [piece], np.array([1.0]), (), load_track("straight"))
 
 
 def test_tables_of_an_estimate_are_its_rms_values_and_largest_forces():

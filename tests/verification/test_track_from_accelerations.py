@@ -19,7 +19,7 @@ from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
 from railsim.measurement.counterpart import amplified, amplifier
 from railsim.observation import Assumed, contact, irregularity
-from railsim.observation.estimate import BANDS, Estimate, joined
+from railsim.observation.estimate import BANDS, Estimate, join_pieces
 from railsim.observation.estimate import rms as deviation
 from railsim.observation.irregularity import _flanges, _Smooth
 from railsim.observation.pieces import Piece, on_grid
@@ -47,7 +47,7 @@ STRAIGHT = railsim.load_track("straight")
 @pytest.fixture(scope="module", autouse=True)
 def contact_in_the_mean_once():
     """On the assumed track at one speed it is the same whatever is read: a third of an estimate."""
-    kept, found = {}, contact.in_the_mean
+    kept, found = {}, contact.with_mean_contact
 
     def once(vehicle, track, linear, tangent, *rest):
         key = vehicle.name, track.gauge, track.friction, tangent.speed, repr(rest)
@@ -58,7 +58,7 @@ def contact_in_the_mean_once():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact, "LENGTH", 600.0)
         # the package has a function of the module's name
-        patch.setattr(import_module("railsim.observation.irregularity"), "in_the_mean", once)
+        patch.setattr(import_module("railsim.observation.irregularity"), "with_mean_contact", once)
         yield
 
 
@@ -445,7 +445,7 @@ def test_friction_elements_that_keep_their_state_have_no_equation_at_rest(monkey
     linear = LinearVehicle(wagon, track)
     rough = {"spectrum": "erri_b176_low", "wavelengths": [3.0, 100.0]}
     tangent = track_response(linear, {}, 25.0)
-    found, noise = contact.in_the_mean(wagon, track, linear, tangent, rough)
+    found, noise = contact.with_mean_contact(wagon, track, linear, tangent, rough)
     assert np.isfinite(found.A).all()
     assert np.isfinite(noise.power).all()
 
@@ -579,7 +579,7 @@ def test_pieces_are_joined_linearly_and_flanges_named_from_their_first_to_their_
             outputs=("lateral.1",), forces=aside, force_deviations=np.zeros(1),
         )  # fmt: skip
 
-    found = joined(
+    found = join_pieces(
         "run", "coach", [piece(0.0, 1.0), piece(80.0, 3.0)], np.array([0.006]), (), STRAIGHT
     )
     assert found.flanges == ((1, 40.0, 50.0),)
@@ -612,7 +612,9 @@ def test_picture_shades_the_95_per_cent_interval_of_each_quantity():
         band_deviations=dict.fromkeys(BANDS, deviations), wave_numbers=none[0], seen=none,
         power=none, outputs=("lateral.1",), forces=rows[:1], force_deviations=np.zeros(1),
     )  # fmt: skip
-    figure = irregularity_figure(joined("run", "coach", [piece], np.array([0.1]), (), STRAIGHT))
+    figure = irregularity_figure(
+        join_pieces("run", "coach", [piece], np.array([0.1]), (), STRAIGHT)
+    )
     assert len({line.get_linestyle() for line in figure.axes[3].lines[:3]}) == 3
     for q, axes in enumerate(figure.axes[:3]):
         for shaded in axes.collections:
