@@ -49,10 +49,10 @@ def describe(item: "FileDefinition | Result", speeds: Sequence[float | str] = ()
     if item.KIND == "study":
         study = cast("Study", item)
         data = {"kind": "study", "runs": study.runs, **study.model_dump(exclude_none=True)}
-        words = f"{study.runs} run{'s' * (study.runs != 1)}"
+        runs_text = f"{study.runs} run{'s' * (study.runs != 1)}"
         if study.optimise:
-            words = f"up to {study.optimise.evaluations} designs, {words} each"
-        return Description(data, [f"{study.name}: {words}", "", study.to_toml().rstrip()])
+            runs_text = f"up to {study.optimise.evaluations} designs, {runs_text} each"
+        return Description(data, [f"{study.name}: {runs_text}", "", study.to_toml().rstrip()])
     return Description(data, [item.to_toml().rstrip()])
 
 
@@ -74,8 +74,8 @@ def _result(result: "Result") -> Description:
     remarks = list(result.remarks)
     data = {"kind": "result", "attributes": attributes, "remarks": remarks}
     data |= {"coordinates": coordinates, "quantities": quantities}
-    each = ((name, *q.values()) for name, q in quantities.items())
-    rows = [[n, ", ".join(dims), " x ".join(map(str, size)), unit] for n, dims, size, unit in each]
+    items = ((name, *q.values()) for name, q in quantities.items())
+    rows = [[n, ", ".join(dims), " x ".join(map(str, size)), unit] for n, dims, size, unit in items]
     return Description(
         data,
         [

@@ -14,15 +14,15 @@ def mechanism_parts(mechanism: Mechanism) -> Parts:
     """Return parts, driver and parameters with their provenance."""
     values = parameter_values(mechanism)
     driver = mechanism.driver
-    moved = driver.angle or driver.coordinate or " to ".join(driver.length or ())
+    driver_name = driver.angle or driver.coordinate or " to ".join(driver.length or ())
     parts: Parts = [mechanism.name]
     parts += [f"  source: {mechanism.source}"] if mechanism.source else []
 
     def names(*tables: str) -> Parts:
-        found = ((table, getattr(mechanism, table)) for table in tables)
-        return [f"  {table}: {', '.join(keys)}" for table, keys in found if keys]
+        members = ((table, getattr(mechanism, table)) for table in tables)
+        return [f"  {table}: {', '.join(keys)}" for table, keys in members if keys]
 
-    parts += [*names("bodies", "joints"), f"  driven by {moved}"]
+    parts += [*names("bodies", "joints"), f"  driven by {driver_name}"]
     parts += names("actuators", "elements", "cases", "catalogues")
     right = [Column(name, format=">") for name in ("value", "unit", "provenance")]
     rows = [
@@ -61,14 +61,14 @@ def spring_parts(suspension: TrailingArmSuspension) -> Parts:
     if suspension.engagement:
         parts.append(f"the inner spring works from {1e3 * suspension.engagement:g} mm on")
     points = [("mounting", suspension.mounting), ("target", suspension.target)]
-    wanted = {point.load: (name, point.deflection) for name, point in points if point is not None}
+    targets = {point.load: (name, point.deflection) for name, point in points if point is not None}
     loads = [[name, load, None] for name, load in suspension.loads.items()]
-    loads += [[name, load, deflection] for load, (name, deflection) in wanted.items()]
+    loads += [[name, load, deflection] for load, (name, deflection) in targets.items()]
     force = Column("force", unit="kN", format="g")
     deflection = Column("deflection", "wanted deflection", "mm", "g")
     parts += ["", Table([Column("load"), force, deflection], loads)]
-    others = ("fatigue", "search", "tolerances", "vehicle")
-    present = [name for name in others if getattr(suspension, name) is not None]
+    optional = ("fatigue", "search", "tolerances", "vehicle")
+    present = [name for name in optional if getattr(suspension, name) is not None]
     return [*parts, "", f"tables besides: {', '.join(present) or 'none'}"]
 
 

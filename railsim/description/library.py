@@ -54,10 +54,10 @@ def library_entries(kind: str) -> list[dict[str, Any]]:
 def _first_line(path: Path) -> str:
     """Return the first line of the text that a Python file begins with; nothing is executed."""
     try:
-        words = ast.get_docstring(ast.parse(read_text(path, DEFINITION_BYTES)))
+        docstring = ast.get_docstring(ast.parse(read_text(path, DEFINITION_BYTES)))
     except (SyntaxError, ValueError) as error:
         return f"no Python: {error}"
-    return (words or "").partition("\n")[0]
+    return (docstring or "").partition("\n")[0]
 
 
 @cache

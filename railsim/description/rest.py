@@ -27,11 +27,11 @@ def describe_statics(
     parts: Parts = []
     vehicle = permitted_part(vehicle)
     for case in cases:
-        loaded = vehicle.replace(load=case)
-        found, frequencies = static_loads(loaded, track), rest_frequencies(loaded, track=track)
-        data[found.load] = {**found.record(), "frequencies": frequencies.records()}
-        parts += ["", f"At rest, load '{found.load}'", *(f"  {words}" for words in found.displaced)]
-        for table in (*found.tables, frequencies):
+        in_case = vehicle.replace(load=case)
+        static, frequencies = static_loads(in_case, track), rest_frequencies(in_case, track=track)
+        data[static.load] = {**static.record(), "frequencies": frequencies.records()}
+        parts += ["", f"At rest, load '{static.load}'", *(f"  {line}" for line in static.displaced)]
+        for table in (*static.tables, frequencies):
             parts += ["", table] if table.rows else []
     return Description(data, parts)
 
@@ -44,18 +44,18 @@ def rest_frequencies(
     Each is that of the mode in which the motion has the largest share of the kinetic energy, of
     the vehicle linearised at rest: friction sticks. `profiles`, `track`: as of `railsim.modes`.
     """
-    whole = modes(vehicle, track, speed=SLOW, profiles=profiles)
-    found = whole.oscillations
+    motion_modes = modes(vehicle, track, speed=SLOW, profiles=profiles)
+    oscillations = motion_modes.oscillations
     motions = {"bounce": "z", "pitch": "pitch", "roll": "roll"}
     rows = []
     for body in flatten(vehicle).of_kind("body"):
         row: dict[str, Any] = {"body": body.name}
         for name, component in motions.items():
             motion = f"{body.name}.{component}"
-            mode = max(found, key=lambda one: one.participation.get(motion, 0.0), default=None)
+            mode = max(oscillations, key=lambda m: m.participation.get(motion, 0.0), default=None)
             if mode is not None and motion in mode.participation:
                 row[name] = mode.natural_frequency
         rows.append(row)
     columns = [Column(name, unit="Hz", format=".2f") for name in motions]
-    stuck = [remark for remark in whole.remarks if remark.endswith(STICKING)]
+    stuck = [remark for remark in motion_modes.remarks if remark.endswith(STICKING)]
     return Table([Column("body"), *columns], rows, "; ".join(["Natural frequencies", *stuck]))

@@ -27,7 +27,7 @@ ENDS = ("begin", "end")
 ROWS = ("number", "first", "last", "column", "largest_at_rows", "largest_between_rows")
 
 
-def _checked(speed: float | str) -> float:
+def _speed_in_si(speed: float | str) -> float:
     value = speed_in_si(speed)
     if isinstance(value, str) or not value > 0.0:
         allowed = "above 0, such as 20 or '72 km/h'"
@@ -37,7 +37,7 @@ def _checked(speed: float | str) -> float:
 
 def describe_track(track: Track, speeds: Sequence[float | str]) -> Description:
     """Return plan with cant, speeds of the curves, crossings, vertical profile, irregularities."""
-    speeds_si = [_checked(speed) for speed in speeds]
+    speeds_si = [_speed_in_si(speed) for speed in speeds]
     plan, cant = curvature_sections(track), cant_sections(track)
     bends = {curve.section: curve for curve in curves(track)}
     data = {
@@ -59,14 +59,14 @@ def describe_track(track: Track, speeds: Sequence[float | str]) -> Description:
     # the plan's table has the cant at the ends of its elements only
     ramps = {round(r[end], 6) for r in data["cant"] if r["type"] == "LIR" for end in ENDS}
     within = ramps - {round(r[end], 6) for r in data["plan"] for end in ENDS}
-    for name, words in (("cant", "cant (mm)"), ("vertical", "gradient per mille")):
+    for name, heading in (("cant", "cant (mm)"), ("vertical", "gradient per mille")):
         if not (within if name == "cant" else data[name]):
             continue
         rows = [[r["type"], r["begin"], r["end"], _range(r["values"], 1e3)] for r in data[name]]
-        parts += ["", Table([Column(name), *ends, Column("values", words, format=">")], rows)]
-    irregular = [[str(part["type"]), _values(part)] for part in data["irregularities"]]
-    if irregular:
-        parts += ["", Table(["irregularity", "values"], irregular)]
+        parts += ["", Table([Column(name), *ends, Column("values", heading, format=">")], rows)]
+    irregularity_rows = [[str(part["type"]), _values(part)] for part in data["irregularities"]]
+    if irregularity_rows:
+        parts += ["", Table(["irregularity", "values"], irregularity_rows)]
     return Description(data, parts)
 
 
@@ -92,8 +92,8 @@ def _track_lines(track: Track, data: dict[str, Any]) -> list[str]:
         lines.append(f"  friction with slip down to {falling.rest:g} of it, {falling.decay:g} s/m")
     if track.third_body != (1.0, 1.0):
         lines.append(f"  third body: Kalker's coefficients times {either(track.third_body)}")
-    words = "  {rail} rail of {number} sections from s = {begin:g} to {end:g} m"
-    lines += [words.format(**part) for part in data["sections"]]
+    template = "  {rail} rail of {number} sections from s = {begin:g} to {end:g} m"
+    lines += [template.format(**part) for part in data["sections"]]
     for part in data["check_rail"]:
         along = "from s = {begin:g} to {end:g} m" if part["begin"] > -FAR else "all along"
         least = f"flangeway {1e3 * part['flangeway']:g} mm at least"
@@ -103,7 +103,7 @@ def _track_lines(track: Track, data: dict[str, Any]) -> list[str]:
 
 def _sections(part: RailSections) -> dict[str, Any]:
     """Return a range of sections; of what was read the number of sections in it."""
-    places = [one.s + part.shift for one in part.contours or ()]
+    places = [contour.s + part.shift for contour in part.contours or ()]
     number = sum(part.begin <= s <= part.end for s in places)
     return {"rail": part.rail, "begin": part.begin, "end": part.end, "number": number}
 
@@ -121,21 +121,21 @@ def _irregularity(part: Irregularity) -> dict[str, Any]:
         column, at_rows, between, _ = largest_between_rows(part)
         data = {key: value for key, value in data.items() if key not in READING}
         first, last = (part.rows[k][0] + part.shift for k in (0, -1))
-        known = len(part.rows), first, last, column, at_rows, between
-        data |= dict(zip(ROWS, known, strict=True))
+        facts = len(part.rows), first, last, column, at_rows, between
+        data |= dict(zip(ROWS, facts, strict=True))
     return data
 
 
 def _values(part: dict[str, Any]) -> str:
     """Return an irregularity in words; rows that were read with their range in mm."""
     plain = {key: short(value) for key, value in part.items() if key not in ("type", *ROWS)}
-    words = [f"{key} {value}" for key, value in plain.items()]
+    texts = [f"{key} {value}" for key, value in plain.items()]
     if "number" in part:
         first, last, column = (part[key] for key in ("first", "last", "column"))
         largest = [1e3 * part[key] for key in ("largest_at_rows", "largest_between_rows")]
-        words.append(f"{part['number']} rows from s = {first:g} to {last:g} m")
-        words.append("{} up to {:.2f} mm, {:.2f} mm between the rows".format(column, *largest))
-    return ", ".join(words)
+        texts.append(f"{part['number']} rows from s = {first:g} to {last:g} m")
+        texts.append("{} up to {:.2f} mm, {:.2f} mm between the rows".format(column, *largest))
+    return ", ".join(texts)
 
 
 def _row(section: Section) -> dict[str, Any]:

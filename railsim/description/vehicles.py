@@ -38,10 +38,10 @@ def describe_vehicle(vehicle: Vehicle) -> Description:
     data |= {"service": service and service.model_dump(), "load": vehicle.load, "loads": loads}
     data |= {"bodies": bodies, "elements": elements}
     kinds = Counter(body.kind for body in flat.bodies)
-    counted = ", ".join(f"{n} {_counted_kind(kind, n)}" for kind, n in kinds.items())
+    counts = ", ".join(f"{n} {_kind_word(kind, n)}" for kind, n in kinds.items())
     parts: Parts = [
         vehicle.name,
-        f"  {counted}, {len(elements)} elements; mass {flat.mass / 1e3:.3f} t; mean wheel load "
+        f"  {counts}, {len(elements)} elements; mass {flat.mass / 1e3:.3f} t; mean wheel load "
         f"{flat.mean_wheel_load / 1e3:.2f} kN; distance is that of '{flat.reference}'",
     ]
     parts += [f"  source: {vehicle.source}"] if vehicle.source else []
@@ -75,7 +75,7 @@ def _body_table(bodies: Iterable[dict[str, Any]]) -> Table:
     return Table([*columns, *inertias, *positions], rows)
 
 
-def _counted_kind(kind: str, number: int) -> str:
+def _kind_word(kind: str, number: int) -> str:
     words = {"body": ("body", "bodies"), "axlebox": ("axlebox", "axleboxes")}
     return words.get(kind, (kind, f"{kind}s"))[number > 1]
 
@@ -112,6 +112,6 @@ def _preload_note(vehicle: Vehicle) -> list[str]:
     if not auto:
         return []
     design = " in the design load" if vehicle.loads else ""
-    found = f"preload of {len(auto)} elements found so that the nominal position is in equilibrium"
-    moved = f"; heights with load '{vehicle.load}': see --static" if vehicle.load else ""
-    return ["", f"assumed: {found}{design}{moved}"]
+    text = f"preload of {len(auto)} elements found so that the nominal position is in equilibrium"
+    heights = f"; heights with load '{vehicle.load}': see --static" if vehicle.load else ""
+    return ["", f"assumed: {text}{design}{heights}"]
