@@ -34,7 +34,7 @@ _SYSTEM = (Path("/proc"), Path("/sys"), Path("/dev"))
 _SHARED_MEMORY = Path("/dev/shm")  # files there are users' own
 _SUFFIX = ".railsim.partial"
 _RANDOM = rf"\.[a-z0-9_]{{8}}{re.escape(_SUFFIX)}"  # as `tempfile` names files
-_OF_FILES = (*RESULTS, *PICTURES, *TABLES, ".csv", ".json", ".html", ".txt")
+_FILE_ENDINGS = (*RESULTS, *PICTURES, *TABLES, ".csv", ".json", ".html", ".txt")
 _NO_WAITING = getattr(os, "O_NONBLOCK", 0)
 _BINARY = getattr(os, "O_BINARY", 0)
 _CLOSED_FIRST = os.name == "nt"  # Windows neither renames nor removes an open file
@@ -80,14 +80,14 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
         pass
     elif folder.exists() and not folder.is_dir():
         found, allowed = f"{folder} is a file", "give the name of a folder"
-    elif not folder.exists() and folder.suffix.lower() in _OF_FILES:
+    elif not folder.exists() and folder.suffix.lower() in _FILE_ENDINGS:
         found, allowed = f"{folder.name} is the name of a file", "give the name of a folder"
     elif found := _unwritable(folder):
         allowed = "choose another folder"
     else:
-        there = [name for name in names if (folder / name).exists()]
-        unlike = [name for name in there if (folder / name).is_dir() != name.endswith("/")]
-        files = ", ".join(name for name in there if not name.endswith("/"))
+        existing = [name for name in names if (folder / name).exists()]
+        unlike = [name for name in existing if (folder / name).is_dir() != name.endswith("/")]
+        files = ", ".join(name for name in existing if not name.endswith("/"))
         if unlike:
             found = f"{folder / unlike[0]} is a {'file' if unlike[0].endswith('/') else 'folder'}"
             allowed = "rename it, or choose another folder"
@@ -120,8 +120,8 @@ def make_folder(folder: Path, parameter: str = "path") -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        words = f"cannot make {folder} ({error.strerror})"
-        _refuse(words, "choose another folder", parameter=parameter)
+        found = f"cannot make {folder} ({error.strerror})"
+        _refuse(found, "choose another folder", parameter=parameter)
 
 
 def _refuse(found: str, allowed: str, option: str = "--out", *, parameter: str = "path") -> None:
@@ -133,7 +133,7 @@ def _unwritable(folder: Path) -> str:
     """Return why nothing can be written into a folder, which may still have to be made."""
     if folder.is_symlink() and not folder.exists():
         return f"{folder} is a link that leads nowhere"
-    existing = next(one for one in (folder.absolute(), *folder.absolute().parents) if one.exists())
+    existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
     if not existing.is_dir():
         return f"{existing} is a file"
     return "" if os.access(existing, os.W_OK | os.X_OK) else f"{existing} cannot be written to"
@@ -213,8 +213,8 @@ def open_regular(path: str | Path) -> BinaryIO:
 
 
 def _unreadable(path: Path, error: Exception) -> InputError:
-    words = getattr(error, "strerror", None) or str(error)
-    return input_error(path, f"cannot be read ({words})")
+    reason = getattr(error, "strerror", None) or str(error)
+    return input_error(path, f"cannot be read ({reason})")
 
 
 def read_text(path: str | Path, limit: int) -> str:
@@ -245,8 +245,8 @@ class PartialFile(AbstractContextManager["PartialFile"]):
         self._create()
         if sweep(target.parent, _prefix(target.name), self.path) and alone:
             self.remove()
-            words = f"{target} is being written by another process"
-            _refuse(words, "wait for it, or choose another name", option)
+            found = f"{target} is being written by another process"
+            _refuse(found, "wait for it, or choose another name", option)
 
     def _create(self) -> None:
         folder, prefix = self.target.parent, _prefix(self.target.name)
@@ -274,7 +274,7 @@ class PartialFile(AbstractContextManager["PartialFile"]):
             os.replace(self.path, path)
         else:
             names = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(2))
-            path = next(name for name in chain([path], names) if _linked(self.path, name))
+            path = next(name for name in chain([path], names) if _link(self.path, name))
         with suppress(OSError):  # not every file system lets folders be opened
             folder = os.open(path.parent, os.O_RDONLY)
             try:
@@ -344,10 +344,10 @@ def remove_partial_files() -> None:
             path.unlink()
 
 
-def sweep(folder: Path, prefix: str = "", own: Path | None = None) -> int:
+def sweep(folder: Path, prefix: str = "", spared: Path | None = None) -> int:
     """Remove the hidden files that dead processes have left in a folder; count those in use.
 
-    Of all targets, or of the one whose hidden files begin with `prefix`; `own` is not looked at.
+    Of all targets, or of the one whose hidden files begin with `prefix`; `spared` is not looked at.
     """
     partial = re.compile((re.escape(prefix[:-1]) if prefix else r"\..+") + _RANDOM, re.DOTALL)
     alive = 0
@@ -357,7 +357,7 @@ def sweep(folder: Path, prefix: str = "", own: Path | None = None) -> int:
         return 0
     for path in paths:
         with suppress(OSError):  # a link, gone by now, or on a file system without locks
-            if own is not None and path.name == own.name:  # absolute, where the folder is not
+            if spared is not None and path.name == spared.name:  # absolute, where the folder is not
                 continue
             handle = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | _NO_WAITING)
             try:
@@ -389,7 +389,7 @@ def _usual_mode(target: Path) -> int:
         return 0o666 & ~mask
 
 
-def _linked(partial: Path, path: Path) -> bool:
+def _link(partial: Path, path: Path) -> bool:
     """Give a file its name unless another file has it; return whether it has got it."""
     try:
         os.link(partial, path)

@@ -66,14 +66,14 @@ def descend(
         last = depth == len(path) - 1
         if last and (isinstance(node, dict) or key is not None):
             return node, part if isinstance(node, dict) else key
-        others = defaults if isinstance(node, dict) and isinstance(defaults, dict) else {}
-        known = part in others
-        defaults = others.get(part)
-        if key is None and isinstance(node, dict) and (known or create):
+        defaults_here = defaults if isinstance(node, dict) and isinstance(defaults, dict) else {}
+        is_default = part in defaults_here
+        defaults = defaults_here.get(part)
+        if key is None and isinstance(node, dict) and (is_default or create):
             node[part] = {} if create and not defaults else deepcopy(defaults)
             key = part
         if key is None:
-            raise KeyError(_no_member(node, part, path[:depth], others))
+            raise KeyError(_no_member(node, part, path[:depth], defaults_here))
         node = node[key]
         if node is None:
             raise KeyError(f"'{'.'.join(path[: depth + 1])}' is not given; give it as a whole")
@@ -123,14 +123,14 @@ def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]
     if len(whole) < 2 or whole[0] in data or whole[0] in (defaults or {}):
         return whole
     for end in range(len(whole), 0, -1):
-        found = [keys for keys in _paths(data) if _holds(keys, whole[:end])]
+        matches = [keys for keys in _paths(data) if _holds(keys, whole[:end])]
         # a load case repeats keys of bodies: a short path means the body
-        found = [keys for keys in found if keys[0] != LOADS] or found
-        if len(found) > 1 and end == len(whole):
-            shown = ", ".join(".".join(keys) for keys in found[:4])
-            raise KeyError(f"'{'.'.join(whole)}' is {len(found)} keys: {shown}")
-        if len(found) == 1:
-            return [*found[0], *whole[end:]]
+        matches = [keys for keys in matches if keys[0] != LOADS] or matches
+        if len(matches) > 1 and end == len(whole):
+            examples = ", ".join(".".join(keys) for keys in matches[:4])
+            raise KeyError(f"'{'.'.join(whole)}' is {len(matches)} keys: {examples}")
+        if len(matches) == 1:
+            return [*matches[0], *whole[end:]]
     return whole
 
 
@@ -139,8 +139,8 @@ def _paths(node: Any, before: tuple[str, ...] = ()) -> Iterator[list[str]]:
         members = [(str(key), value) for key, value in node.items()]
     elif isinstance(node, list):
         vector = len(node) == len(AXES) and all(_is_number(value) for value in node)
-        named = [isinstance(m, dict) and "name" in m for m in node]
-        names = [str(m["name"] if named[i] else i) for i, m in enumerate(node)]
+        has_name = [isinstance(m, dict) and "name" in m for m in node]
+        names = [str(m["name"] if has_name[i] else i) for i, m in enumerate(node)]
         members = list(zip(AXES if vector else names, node, strict=True))
     else:
         return
@@ -160,10 +160,10 @@ def _holds(keys: Sequence[str], path: Sequence[str]) -> bool:
 def _no_member(node: Any, part: str, before: Sequence[str], others: Iterable[str]) -> str:
     table = ".".join(before) or "the file"
     if isinstance(node, dict):
-        known = {*node, *others}
-        allowed = nearest(part, known) if known else "it is empty"
-        named = all(isinstance(member, dict) for member in node.values())
-        new = named and not allowed.startswith("did you mean")
+        choices = {*node, *others}
+        allowed = nearest(part, choices) if choices else "it is empty"
+        is_table_of_tables = all(isinstance(member, dict) for member in node.values())
+        new = is_table_of_tables and not allowed.startswith("did you mean")
         kinds = NEW_MEMBERS.get(before[-1], "") if before else ""
         adds = f"{table}.{part}={{{kinds}...}} adds it" if new else ""
         return "; ".join(filter(None, [f"no '{part}' in {table}", allowed, adds]))

@@ -33,7 +33,7 @@ def apply_overrides(
     source gives no value, so that `fastsim_grid.0=20` changes one of two. Raises InputError: an
     assignment that means nothing; all of them at once.
     """
-    return _changed(source, map(_parsed, overrides), free, defaults, OVERRIDE)
+    return _assign(source, map(_split, overrides), free, defaults, OVERRIDE)
 
 
 def with_values(
@@ -47,14 +47,14 @@ def with_values(
     """
     if not isinstance(values, Mapping):
         raise TypeError(f"the values are {values!r}; give keys with their values: {{'key': 1.0}}")
-    given = ((key, lambda _, value=value: _plain(value)) for key, value in values.items())
-    return _changed(source, given, free, defaults, source.file)
+    assignments = ((key, lambda _, value=value: _plain(value)) for key, value in values.items())
+    return _assign(source, assignments, free, defaults, source.file)
 
 
-def _parsed(text: str) -> tuple[str, Read | None]:
+def _split(text: str) -> tuple[str, Read | None]:
     """Return the key of an assignment, and what makes its value of the present one."""
-    key, equals, written = text.partition("=")
-    return key.strip(), partial(_value, written.strip()) if equals else None
+    key, equals, text_value = text.partition("=")
+    return key.strip(), partial(_value, text_value.strip()) if equals else None
 
 
 def _plain(value: Any) -> Any:
@@ -68,7 +68,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _changed(
+def _assign(
     source: Source,
     assignments: Iterable[tuple[str, Read | None]],
     free: Sequence[str],
@@ -100,18 +100,18 @@ def _changed(
     return changed
 
 
-def _value(written: str, present: Any) -> Any:
+def _value(text: str, present: Any) -> Any:
     """Return a written value: TOML, and what is not TOML is text without its quotes."""
     text_expected = isinstance(present, str)
     try:
-        value = tomllib.loads(f"value = {written}")["value"]
+        value = tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
-        if not written or written[0] in "[{\"'":
-            raise KeyError(f"the value '{shortened(written)}' is not TOML") from None
-        return written if text_expected or (found := number_with_unit(written)) is None else found
+        if not text or text[0] in "[{\"'":
+            raise KeyError(f"the value '{shortened(text)}' is not TOML") from None
+        return text if text_expected or (found := number_with_unit(text)) is None else found
     except (ValueError, RecursionError):  # an integer of 5000 digits, a thousand brackets
-        raise KeyError(f"the value '{shortened(written)}' is out of range") from None
-    return written if text_expected and not isinstance(value, str | list | dict) else value
+        raise KeyError(f"the value '{shortened(text)}' is out of range") from None
+    return text if text_expected and not isinstance(value, str | list | dict) else value
 
 
 def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
@@ -122,15 +122,15 @@ def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
     >>> split_overrides(["track.friction=0.3", "settings.scheme=rk4"])
     {'vehicle': [], 'track': ['friction=0.3'], 'settings': ['scheme=rk4']}
     """
-    sorted_ones: dict[str, list[str]] = {"vehicle": [], "track": [], "settings": []}
+    by_kind: dict[str, list[str]] = {"vehicle": [], "track": [], "settings": []}
     faults = Faults()
     for text in overrides:
         prefix, _, rest = text.partition(".")
-        if prefix in sorted_ones:
-            sorted_ones[prefix].append(rest)
+        if prefix in by_kind:
+            by_kind[prefix].append(rest)
         else:
             key = text.partition("=")[0]
             allowed = "a path that begins with vehicle., track. or settings."
             faults.append(located_fault(OVERRIDE, key, "unknown beginning", allowed))
     faults.check()
-    return sorted_ones
+    return by_kind

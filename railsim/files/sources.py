@@ -149,7 +149,7 @@ def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
     in_libraries: Iterable[Path] = ()
     if kind in FOLDERS:
         in_libraries = (folder / f"{name}.toml" for folder in library_folders(kind))
-    own = None
+    same = None
     for candidate in itertools.chain(candidates, in_libraries):
         # a file of somebody else leads to definitions only
         if not is_file(candidate) or (beside is not None and candidate.suffix != ".toml"):
@@ -157,9 +157,9 @@ def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
         # a file that extends its own name means the shipped one
         if beside is None or candidate.resolve() != beside.resolve():
             return candidate
-        own = candidate
-    if own is not None:
-        return own
+        same = candidate
+    if same is not None:
+        return same
     raise InputError([_no_file(name, kind, candidates[0], beside)])
 
 
@@ -174,14 +174,14 @@ def find_any(name: str | Path) -> Path:
         if str(name) in library_files(kind):
             return find_file(name, kind)
     found = f"'{name}' is a folder" if os.path.isdir(name) else f"no file '{name}'"
-    known = {name for kind in FOLDERS for name in library_files(kind)}
-    hint = nearest(str(name), known).removeprefix("allowed: ")
+    names = {name for kind in FOLDERS for name in library_files(kind)}
+    hint = nearest(str(name), names).removeprefix("allowed: ")
     raise input_error(name, found, f"a path, or a shipped name: {hint}")
 
 
 def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fault:
     found = f"'{name}' is a folder" if os.path.isdir(path) else f"no file '{name}'"
-    others = (one for one in FOLDERS if one != kind and str(name) in library_files(one))
+    others = (k for k in FOLDERS if k != kind and str(name) in library_files(k))
     if beside is None and (other := next(others, None)):
         found = f"'{name}' is a shipped {other}"
     allowed = "a path"
@@ -228,12 +228,12 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         found = "values nested too deeply"
         raise input_error(file, found, f"{DEEPEST} levels at most") from None
     except tomllib.TOMLDecodeError as error:
-        located = re.search(r"\s*\(at line (\d+), column (\d+)\)", str(error))
-        if located:
-            message = str(error).replace(located.group(0), "")
-            key = f"line {located.group(1)}"
-            found = f"broken TOML at column {located.group(2)}: {message}"
-            if _DECIMAL_COMMA.search(text.split("\n")[int(located.group(1)) - 1]):
+        position = re.search(r"\s*\(at line (\d+), column (\d+)\)", str(error))
+        if position:
+            message = str(error).replace(position.group(0), "")
+            key = f"line {position.group(1)}"
+            found = f"broken TOML at column {position.group(2)}: {message}"
+            if _DECIMAL_COMMA.search(text.split("\n")[int(position.group(1)) - 1]):
                 found += "; numbers have a decimal point, not a comma"
             elif message == "Cannot overwrite a value":
                 found += "; the key has a value already"
@@ -280,9 +280,9 @@ def text_source(text: str, file: str, kind: str) -> Source:
 def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ...]) -> Source:
     data, base_name, removed = _without_extends(data, path)
     _anchor_files(data, path.parent, FILE_KEYS | FILE_KEYS_OF.get(kind, set()))
-    own = Source(str(path), data, dict.fromkeys(_paths(data, ()), str(path)))
+    source = Source(str(path), data, dict.fromkeys(_paths(data, ()), str(path)))
     if base_name is None:
-        return own
+        return source
     # the file's own kind, so that a file of a wrong kind is told by its format, not by its base
     stated = str(data.get("format")).removeprefix("railsim-").partition("/")[0]
     base_path = find_file(base_name, stated if stated in FOLDERS else kind, beside=path)
@@ -305,13 +305,13 @@ def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ..
             faults.append(Fault(str(path), "remove", found, allowed))
     faults.check()
     if kind == "limits":
-        Faults(_of_others(base.data, data, (), str(path))).check()
+        Faults(_source_faults(base.data, data, (), str(path))).check()
     _merge(base.data, data, (), base.origin, str(path))
     return Source(str(path), base.data, base.origin)
 
 
-def _of_others(
-    table: Mapping[str, Any], changes: Mapping[str, Any], at: KeyPath, file: str
+def _source_faults(
+    table: Mapping[str, Any], changes: Mapping[str, Any], path: KeyPath, file: str
 ) -> Iterator[Fault]:
     """Yield a fault of each value that would bear the source, or the check, of the one it replaces.
 
@@ -319,20 +319,20 @@ def _of_others(
     """
     for key in ("source", "checked") if changes.keys() - {"checked"} else ():
         if table.get(key) and key not in changes:
-            key = ".".join((*at, key))
+            key = ".".join((*path, key))
             yield Fault(file, key, "missing", "needed beside a value in place of another")
     for key, value in changes.items():
         old = table.get(key)
         if isinstance(value, dict) and isinstance(old, dict):
-            yield from _of_others(old, value, (*at, key), file)
+            yield from _source_faults(old, value, (*path, key), file)
 
 
-def _paths(node: Any, at: KeyPath) -> Iterator[KeyPath]:
+def _paths(node: Any, path: KeyPath) -> Iterator[KeyPath]:
     """Yield the key paths of everything in a nested table; a list comes as a whole."""
     if isinstance(node, dict):
         for key, value in node.items():
-            yield (*at, str(key))
-            yield from _paths(value, (*at, str(key)))
+            yield (*path, str(key))
+            yield from _paths(value, (*path, str(key)))
 
 
 def _without_extends(
@@ -357,13 +357,13 @@ def _without_extends(
 def _merge(
     table: dict[str, Any],
     changes: dict[str, Any],
-    at: KeyPath,
+    parent: KeyPath,
     origin: dict[KeyPath, str],
     file: str,
 ) -> None:
     """Put `changes` over a table; a table of another `kind` replaces the old one as a whole."""
     for key, value in changes.items():
-        path = (*at, key)
+        path = (*parent, key)
         old = table.get(key)
         origin[path] = file
         kind = old.get("kind") if isinstance(old, dict) else None
@@ -378,8 +378,8 @@ def replace_origin(
     origin: dict[KeyPath, str], path: KeyPath, old: Any, value: Any, file: str
 ) -> None:
     """Note that the value at a path, with everything in it, came from a file."""
-    for known in _paths(old, path):
-        origin.pop(known, None)
+    for old_path in _paths(old, path):
+        origin.pop(old_path, None)
     origin[path] = file
     origin.update(dict.fromkeys(_paths(value, path), file))
 
@@ -389,14 +389,14 @@ def _anchor_files(node: Any, folder: Path, keys: set[str]) -> None:
     members = node.items() if isinstance(node, dict) else enumerate(node)
     for key, value in list(members):
         if key in keys and not isinstance(value, dict):
-            node[key] = _anchored(value, folder)
+            node[key] = _anchor(value, folder)
         elif isinstance(value, dict | list):  # in a table under such a key all may be files
             _anchor_files(value, folder, keys.union(value) if key in keys else keys)
 
 
-def _anchored(value: Any, folder: Path) -> Any:
+def _anchor(value: Any, folder: Path) -> Any:
     if isinstance(value, list):
-        return [_anchored(member, folder) for member in value]
+        return [_anchor(member, folder) for member in value]
     if isinstance(value, str) and value and is_file(folder / value):
         return str((folder / value).resolve())
     return value
