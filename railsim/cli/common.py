@@ -147,10 +147,10 @@ def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["
 
         notes = [*notes, *(Remark("irregularities", text) for text in measured_remarks(definition))]
     if isinstance(definition, Vehicle | Track):
-        from railsim.laws.permission import refused
+        from railsim.laws.permission import refused_laws
 
         left_out = "not executed here: left out of pictures and of the vehicle at rest"
-        notes = [*notes, *(Remark(f"laws.{name}", left_out) for name in refused(definition))]
+        notes = [*notes, *(Remark(f"laws.{name}", left_out) for name in refused_laws(definition))]
     return notes
 
 

@@ -39,13 +39,13 @@ KNOWN = "import math\nfrom math import *\n\nimport numpy as np"
 """What a function that is given in Python knows beside its arguments."""
 
 
-def _mark(kind: str, words: str) -> Callable[[F], F]:
+def _mark(kind: str, purpose: str) -> Callable[[F], F]:
     def mark(function: F) -> F:
         setattr(function, KIND, kind)
         return function
 
     mark.__name__ = mark.__qualname__ = kind
-    mark.__doc__ = f"Mark a function as {words}."
+    mark.__doc__ = f"Mark a function as {purpose}."
     return mark
 
 

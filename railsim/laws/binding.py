@@ -64,39 +64,39 @@ class Bound:
     defaults: Mapping[str, float]  # of parameters that need not be given
     kept: tuple[Any, ...]  # what has to live as long as the address is called
 
-    def values(self, given: Floats, parameters: Sequence[float]) -> Any:
+    def values(self, inputs: Floats, parameters: Sequence[float]) -> Any:
         """What a law of one value gives, called beside the loop.
 
         `parameters`: as `parameters` returns them.
         """
-        n, k = given.shape
-        block, found = np.array([0.0] * (1 + k) + list(parameters)), np.empty(n)
+        n, k = inputs.shape
+        block, results = np.array([0.0] * (1 + k) + list(parameters)), np.empty(n)
         function, place = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self.address), block.ctypes.data
         for row in range(n):
-            block[1 : 1 + k] = given[row]
+            block[1 : 1 + k] = inputs[row]
             function(place)
-            found[row] = block[0]
-        return found
+            results[row] = block[0]
+        return results
 
-    def parameters(self, key: str, given: Mapping[str, float]) -> list[float]:
+    def parameters(self, key: str, values: Mapping[str, float]) -> list[float]:
         """Values of its parameters in their order.
 
         Raises InputError: one is missing, or one too many is given.
         """
-        own = {**self.defaults, **given}
-        wrong = [n for n in given if n not in self.further]
-        missing = [n for n in self.further if n not in own]
+        values_by_name = {**self.defaults, **values}
+        wrong = [n for n in values if n not in self.further]
+        missing = [n for n in self.further if n not in values_by_name]
         if wrong or missing:
             found = (
                 f"the law '{self.name}' has no argument '{wrong[0]}'"
                 if wrong
                 else (f"no value for '{missing[0]}', an argument of the law '{self.name}'")
             )
-            raise input_error("vehicle", found, _listed(self.further), key=key)
-        return [float(own[name]) for name in self.further]
+            raise input_error("vehicle", found, _allowed_text(self.further), key=key)
+        return [float(values_by_name[name]) for name in self.further]
 
 
-def _listed(names: Sequence[str]) -> str:
+def _allowed_text(names: Sequence[str]) -> str:
     return f"allowed: {', '.join(names)}" if names else "it has no parameters"
 
 
@@ -114,7 +114,7 @@ def bind(name: str, law: Law, takes: Takes, gives: int | None = None, memory: in
 
 @cache
 def _bound(name: str, law: Law, takes: Takes, gives: int | None, memory: int) -> Bound:
-    return _Binding(name, law, takes, gives, memory).bound()
+    return _Binding(name, law, takes, gives, memory).bind()
 
 
 class _Binding:
@@ -129,7 +129,7 @@ class _Binding:
         self.file = law.file or f"<law {name}>"
         self.source = law.source or ""
 
-    def bound(self) -> Bound:
+    def bind(self) -> Bound:
         function = self._function()
         arguments = inspect.signature(function).parameters
         names = self.names = list(arguments)
@@ -142,24 +142,24 @@ class _Binding:
         if (MEMORY in names) != (self.memory > 0):
             has = ("an argument", "key") if MEMORY in names else ("a key", "argument")
             self._refuse(f"has {has[0]} 'memory' but no {has[1]} of this name", "both or neither")
-        given = {n: arguments[n].default for n in further}
-        defaults = {n: v for n, v in given.items() if v is not inspect.Parameter.empty}
+        all_defaults = {n: arguments[n].default for n in further}
+        defaults = {n: v for n, v in all_defaults.items() if v is not inspect.Parameter.empty}
         for n, value in defaults.items():
             if not isinstance(value, Real) or not math.isfinite(value):
                 self._refuse(f"has '{n}' = {value!r}", "a finite number")
         self.allowed = (1 + len(states),) if states else self.takes.gives
         if self.gives is not None:  # one value may be for all
             self.allowed = (self.gives,) if self.gives == 1 else (1, self.gives)
-        named = [n for n in self.takes.named if n not in self.takes.given]
-        order = [*self.takes.given, *named, *states, *further, MEMORY]
+        required = [n for n in self.takes.named if n not in self.takes.given]
+        order = [*self.takes.given, *required, *states, *further, MEMORY]
         self.place = {n: self.allowed[-1] + k for k, n in enumerate(order)}
         compiles = self.law.compiled and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
         address, kept = self._compiled(function) if compiles else self._plain(function)
         return Bound(self.name, address, len(states), tuple(further), defaults, kept)
 
     def _refuse(self, found: str, allowed: str, line: int | None = None) -> None:
-        where = f"line {line}" if line else self.name
-        raise input_error(self.file, f"the law '{self.name}' {found}", allowed, key=where)
+        place = f"line {line}" if line else self.name
+        raise input_error(self.file, f"the law '{self.name}' {found}", allowed, key=place)
 
     def _function(self) -> Any:
         """Execute the text and take the function out of it."""
@@ -182,11 +182,11 @@ class _Binding:
             self._refuse(f"fails when it is read: {type(error).__name__}: {error}", "", line)
         function = space.get(name)
         if not isinstance(function, FunctionType):
-            known = [n for n, f in space.items() if isinstance(f, FunctionType)]
-            self._refuse(f"is no function '{name}' of this file", _listed(known))
-        marked = getattr(function, KIND, None)
-        if marked is not None and marked.replace("_", " ") not in self.takes.words:
-            self._refuse(f"is marked as {marked}", f"{self.takes.words} is needed here")
+            functions = [n for n, f in space.items() if isinstance(f, FunctionType)]
+            self._refuse(f"is no function '{name}' of this file", _allowed_text(functions))
+        mark = getattr(function, KIND, None)
+        if mark is not None and mark.replace("_", " ") not in self.takes.words:
+            self._refuse(f"is marked as {mark}", f"{self.takes.words} is needed here")
         return function
 
     def _check_raises(self, tree: ast.Module, name: str) -> None:
@@ -194,11 +194,11 @@ class _Binding:
         functions = {n.name: n for n in tree.body if isinstance(n, ast.FunctionDef)}
         waiting, seen = [name], set()
         while waiting:
-            one = waiting.pop()
-            if one in seen or one not in functions:
+            name = waiting.pop()
+            if name in seen or name not in functions:
                 continue
-            seen.add(one)
-            for node in ast.walk(functions[one]):
+            seen.add(name)
+            for node in ast.walk(functions[name]):
                 if isinstance(node, ast.Raise | ast.Assert):
                     word = "raise" if isinstance(node, ast.Raise) else "assert"
                     allowed = "return math.nan instead: the run ends there"
@@ -212,21 +212,21 @@ class _Binding:
         types = numba.types
         space = function.__globals__
         for other, helper in list(space.items()):
-            own = isinstance(helper, FunctionType) and helper.__code__.co_filename == self.file
-            if own and helper is not function:
+            local = isinstance(helper, FunctionType) and helper.__code__.co_filename == self.file
+            if local and helper is not function:
                 space[other] = numba.njit(error_model="numpy", boundscheck=True)(helper)
         compiled = numba.njit(error_model="numpy", boundscheck=True)(function)
         kinds = [types.float64[::1] if n == MEMORY else types.float64 for n in self.names]
         try:
             compiled.compile(tuple(kinds))
-            given = compiled.overloads[tuple(kinds)].signature.return_type
-            members = list(given.types) if isinstance(given, types.BaseTuple) else [given]
+            returned = compiled.overloads[tuple(kinds)].signature.return_type
+            members = list(returned.types) if isinstance(returned, types.BaseTuple) else [returned]
             if not all(isinstance(m, types.Number | types.Boolean) for m in members):
-                self._refuse(f"returns {given}", "a number, or several as a tuple")
+                self._refuse(f"returns {returned}", "a number, or several as a tuple")
             number = len(members)
             if number not in self.allowed:
-                words = " or ".join(map(str, self.allowed))
-                self._refuse(f"returns {number} values", f"{words} as {self.takes.words}")
+                counts = " or ".join(map(str, self.allowed))
+                self._refuse(f"returns {number} values", f"{counts} as {self.takes.words}")
             scope: dict[str, Any] = {"law": compiled, "carray": numba.carray, "nan": math.nan}
             exec(self._entry_text(number), scope)
             takes_block = types.void(types.CPointer(types.float64))
@@ -246,10 +246,10 @@ class _Binding:
         def entry(address: int) -> None:
             x = np.ctypeslib.as_array((ctypes.c_double * length).from_address(address))
             try:
-                given = function(
+                returned = function(
                     *(x[place[n] :] if n == MEMORY else float(x[place[n]]) for n in self.names)
                 )
-                members = given if isinstance(given, tuple) else (given,)
+                members = returned if isinstance(returned, tuple) else (returned,)
                 if len(members) not in self.allowed:
                     raise TypeError(f"it returns {len(members)} values")
                 x[:most] = members[0] if len(members) == 1 else 0.0
@@ -265,12 +265,12 @@ class _Binding:
         """Source of the function that takes a block apart and calls the law of so many values."""
         first = self.place[MEMORY]
         view = f"v[{first}:{first + self.memory}]"
-        given = ", ".join(view if n == MEMORY else f"x[{self.place[n]}]" for n in self.names)
+        arguments = ", ".join(view if n == MEMORY else f"x[{self.place[n]}]" for n in self.names)
         lines = ["def entry(x):", "    x[0] = nan"]  # it stays where an index is out of bounds
         if self.memory:
             lines.append(f"    v = carray(x, ({first + self.memory},))")
         results = ", ".join(f"y{k}" for k in range(number))
-        lines += ["    try:", f"        {results} = law({given})"]
+        lines += ["    try:", f"        {results} = law({arguments})"]
         lines += [f"        x[{k}] = y{k}" for k in range(number)]
         rest = "y0" if number == 1 else "0.0"
         lines += [f"        x[{k}] = {rest}" for k in range(number, self.allowed[-1])]

@@ -24,9 +24,9 @@ def digest(source: str) -> str:
 
 def allow(*sources: str) -> None:
     """Permit these sources, or all without any, in this process and those that it starts."""
-    known = [digest(source) for source in sources] or [ALL]
-    present = [one for one in os.environ.get(PERMITTED, "").split(",") if one]
-    os.environ[PERMITTED] = ",".join(dict.fromkeys([*present, *known]))
+    digests = [digest(source) for source in sources] or [ALL]
+    present = [text for text in os.environ.get(PERMITTED, "").split(",") if text]
+    os.environ[PERMITTED] = ",".join(dict.fromkeys([*present, *digests]))
 
 
 @contextmanager
@@ -40,22 +40,22 @@ def allowed(everything: bool) -> Iterator[None]:
 
 def is_allowed(source: str) -> bool:
     """Whether a source may be executed."""
-    known = os.environ.get(PERMITTED, "").split(",")
-    return ALL in known or digest(source) in known
+    digests = os.environ.get(PERMITTED, "").split(",")
+    return ALL in digests or digest(source) in digests
 
 
-def refused(definition: Vehicle | Track | Settings) -> list[str]:
+def refused_laws(definition: Vehicle | Track | Settings) -> list[str]:
     """Return the names of its laws that are not permitted."""
     laws = (definition.laws or {}).items()
-    return [name for name, one in laws if not is_allowed(one.source or "")]
+    return [name for name, law in laws if not is_allowed(law.source or "")]
 
 
 def check_laws(laws: Iterable[tuple[str, Law]]) -> None:
     """Raise InputError with all of some named laws that are not permitted."""
     allowed = "--allow-code, or --law FILE with this file; in Python allow_code=True"
-    words = "is code of {}, which is not executed"
+    text = "is code of {}, which is not executed"
     faults = (
-        Fault("laws", name, f"'{name}' {words.format(law.file or 'a result')}", allowed)
+        Fault("laws", name, f"'{name}' {text.format(law.file or 'a result')}", allowed)
         for name, law in laws
         if not is_allowed(law.source or "")
     )
@@ -64,16 +64,16 @@ def check_laws(laws: Iterable[tuple[str, Law]]) -> None:
 
 def permitted_part(definition: D) -> D:
     """Return a vehicle or track without what a law that is not permitted does, to be looked at."""
-    if not refused(definition):
+    if not refused_laws(definition):
         return definition
     if isinstance(definition, Track):
-        kept = [part for part in definition.irregularities if part.type != "law"]
-        return definition.replace(irregularities=kept, laws=None)
+        parts = [part for part in definition.irregularities if part.type != "law"]
+        return definition.replace(irregularities=parts, laws=None)
 
     def stripped(group: dict[str, Any]) -> dict[str, Any]:
-        kept = {n: e for n, e in group.get("elements", {}).items() if e["kind"] != "law"}
+        parts = {n: e for n, e in group.get("elements", {}).items() if e["kind"] != "law"}
         inner = {n: stripped(a) for n, a in group.get("assemblies", {}).items()}
-        return {**group, "elements": kept, "assemblies": inner}
+        return {**group, "elements": parts, "assemblies": inner}
 
     tables = stripped(definition.model_dump(exclude_none=True))
     return definition.replace(

@@ -17,7 +17,7 @@ from railsim.arrays import Floats
 from railsim.definitions.track import layout
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.elements import Section
-from railsim.laws.permission import refused
+from railsim.laws.permission import refused_laws
 from railsim.plot import style
 from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, key, note, shade, spans, styled
 from railsim.text import unformatted
@@ -101,7 +101,7 @@ def _alignment_rows(track: Track, alignment: Alignment, s: Floats) -> Iterator[_
 def _rail_rows(track: Track, s: Floats) -> Iterator[_Row]:
     """Displacements of the rails by irregularities, and the gauge where it changes."""
     moved, without = shown_displacement(track), ""
-    if names := refused(track):
+    if names := refused_laws(track):
         without = f", without the law {', '.join(names)}"
     if moved is None:
         return
