@@ -34,9 +34,9 @@ def largest_first(values: Sequence[float | None]) -> list[int]:
     >>> largest_first([1.0, None, -2.0, 3.0]), largest_first([-0.1, -0.4, None, 0.0])
     ([3, 0, 2], [1, 0, 3])
     """
-    there = [(value, k) for k, value in enumerate(values) if value is not None]
-    sign = -1.0 if any(value > 0.0 for value, _ in there) else 1.0
-    return [k for _, k in sorted((sign * value, k) for value, k in there)]
+    pairs = [(value, k) for k, value in enumerate(values) if value is not None]
+    sign = -1.0 if any(value > 0.0 for value, _ in pairs) else 1.0
+    return [k for _, k in sorted((sign * value, k) for value, k in pairs)]
 
 
 def stretches(flags: Flags) -> list[tuple[int, int]]:

@@ -68,12 +68,12 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
     for label, result in results.items():
         for peak in peaks(result):
             rows.setdefault((WORDS[peak.kind], peak.quantity.name), {})[label] = peak
-        sections = [one for one in curvature_sections(result.track()) if one.type == "CIR"]
-        middles = [0.5 * (one.begin + one.end) for one in sections]  # a run may begin after some
+        sections = [s for s in curvature_sections(result.track()) if s.type == "CIR"]
+        middles = [0.5 * (s.begin + s.end) for s in sections]  # a run may begin after some
         for curve in mid_curves(result):
-            where = f"full curve {1 + middles.index(curve.distance)}, median"
+            place = f"full curve {1 + middles.index(curve.distance)}, median"
             for peak in curve.median_peaks:
-                rows.setdefault((where, peak.quantity.name), {})[label] = peak
+                rows.setdefault((place, peak.quantity.name), {})[label] = peak
     first = next(iter(results))
     Faults(
         Fault(label, "time", f"holds no instants ({result.status})", "leave it out")
@@ -81,8 +81,8 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
         if not len(result["time"])
     ).check()
     return tuple(
-        Comparison(next(iter(found.values())).quantity, where, found, first)
-        for (where, _), found in rows.items()
+        Comparison(next(iter(by_label.values())).quantity, place, by_label, first)
+        for (place, _), by_label in rows.items()
     )
 
 
@@ -94,30 +94,30 @@ def conditions(results: Mapping[str, Result]) -> dict[str, list[str]]:
     settings, which begin with `track.`, `vehicle.` and `settings.`; not what a run wrote.  Of
     vehicles with different names that differ in more than `MOST_KEYS`, the names alone.
     """
-    each = list(results.values())
-    tracks, vehicles = [one.track() for one in each], [one.vehicle() for one in each]
+    every = list(results.values())
+    tracks, vehicles = [r.track() for r in every], [r.vehicle() for r in every]
     on_track, of_vehicle = differing(tracks), differing(vehicles)
-    whole = {
-        "speed": [f"{result.speed:.6g}" for result in each],
+    values = {
+        "speed": [f"{result.speed:.6g}" for result in every],
         "track": [track.name if on_track else "" for track in tracks],
         "vehicle": [vehicle.name if of_vehicle else "" for vehicle in vehicles],
     }
-    ends = np.array([one["distance"][[0, -1]] for one in each])
+    ends = np.array([r["distance"][[0, -1]] for r in every])
     if np.ptp(ends, axis=0).max() >= 1.0:
-        whole["distance"] = [f"{begin:.6g} to {end:.6g}" for begin, end in ends]
-    found = {key: words for key, words in whole.items() if len(set(words)) > 1}
-    if len(of_vehicle) <= MOST_KEYS or "vehicle" not in found:
-        found |= {f"vehicle.{key}": words for key, words in of_vehicle.items()}
-    found |= {f"track.{key}": words for key, words in on_track.items()}
-    of_settings = differing([result.settings() for result in each])
-    kept = {key: words for key, words in of_settings.items() if not key.startswith("outputs.")}
-    return found | {f"settings.{key}": words for key, words in kept.items()}
+        values["distance"] = [f"{begin:.6g} to {end:.6g}" for begin, end in ends]
+    differences = {key: words for key, words in values.items() if len(set(words)) > 1}
+    if len(of_vehicle) <= MOST_KEYS or "vehicle" not in differences:
+        differences |= {f"vehicle.{key}": words for key, words in of_vehicle.items()}
+    differences |= {f"track.{key}": words for key, words in on_track.items()}
+    of_settings = differing([result.settings() for result in every])
+    chosen = {key: words for key, words in of_settings.items() if not key.startswith("outputs.")}
+    return differences | {f"settings.{key}": words for key, words in chosen.items()}
 
 
-def condition_table(found: Mapping[str, Sequence[str]], labels: Iterable[str]) -> Table:
+def condition_table(conditions: Mapping[str, Sequence[str]], labels: Iterable[str]) -> Table:
     """Return the conditions that differ, those of each result in a column."""
     units = {"speed": "speed (m/s)", "distance": "distance (m)"}
-    rows = [[units.get(key, key), *words] for key, words in found.items()]
+    rows = [[units.get(key, key), *words] for key, words in conditions.items()]
     return Table(["conditions that differ", *map(printable, labels)], rows)
 
 
@@ -125,7 +125,7 @@ def differing(definitions: Sequence[Any]) -> dict[str, list[str]]:
     """Return the keys in which definitions differ, each with all its values in words."""
     flat = [
         {key: NOT_GIVEN.get(key) if value is None else value for key, value in rows}
-        for rows in (flat_keys(one.model_dump()) for one in definitions)
+        for rows in (flat_keys(definition.model_dump()) for definition in definitions)
     ]
     return {
         key: [shortened(in_words(values.get(key, "—"))) for values in flat]
@@ -161,8 +161,8 @@ class Difference:
 
     def record(self) -> dict[str, Any]:
         """Return the largest difference as plain numbers and strings, SI."""
-        where = {"quantity": self.quantity.name, **self.labels, "result": self.result}
-        return where | dict(zip(("largest_difference", "distance"), self.largest, strict=True))
+        place = {"quantity": self.quantity.name, **self.labels, "result": self.result}
+        return place | dict(zip(("largest_difference", "distance"), self.largest, strict=True))
 
     @property
     def largest(self) -> tuple[float, float]:
@@ -188,38 +188,38 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
     (first, base), *others = results.items()
     faults = Faults()
     for label, result in others:
-        if not _of_one_plan(base.track(), result.track()):
+        if not _same_plan(base.track(), result.track()):
             found = f"runs over another plan than {first}"
             faults.append(Fault(label, "track", found, "results over one plan"))
-        elif not _shared(*_places(base, result)).any():
+        elif not _within(*_places(base, result)).any():
             found = f"has no part of the track in common with {first}"
             faults.append(Fault(label, "distance", found, "results that share a part of the track"))
     faults.check()
-    found_ones = []
+    rows = []
     for label, result in others:
-        at, of_other = _places(base, result)
-        there = _shared(at, of_other)
-        positions = base["distance"][there]
+        places, places_other = _places(base, result)
+        common = _within(places, places_other)
+        positions = base["distance"][common]
         for name in names:
             if name in base and name in result:
                 mine, other = _leading(base, name), _leading(result, name)
                 for side, values in mine.items():
-                    there_too = np.interp(at[there], of_other, other[side])
+                    interpolated = np.interp(places[common], places_other, other[side])
                     labels = {"wheelset": base.wheelsets[0], **({"side": side} if side else {})}
-                    apart, quantity = there_too - values[there], base.quantities[name]
-                    found_ones.append(Difference(quantity, labels, label, positions, apart))
-    return found_ones
+                    difference, quantity = interpolated - values[common], base.quantities[name]
+                    rows.append(Difference(quantity, labels, label, positions, difference))
+    return rows
 
 
-def _of_one_plan(one: Track, other: Track) -> bool:
+def _same_plan(first: Track, second: Track) -> bool:
     """Whether two tracks have the same curvature up to rounding, however they are divided."""
     plans = []
-    for track in (one, other):
+    for track in (first, second):
         parts = curvature_sections(track)
         ends = np.ravel([(part.begin + BESIDE, part.end - BESIDE) for part in parts])
         plans.append((ends, np.ravel([(part.start_value, part.end_value) for part in parts])))
-    at = np.concatenate([ends for ends, _ in plans])
-    mine, others = (np.interp(at, *plan) for plan in plans)
+    ends_of_both = np.concatenate([ends for ends, _ in plans])
+    mine, others = (np.interp(ends_of_both, *plan) for plan in plans)
     return bool(np.allclose(mine, others, rtol=1e-6, atol=1e-9))
 
 
@@ -231,22 +231,22 @@ def _leading(result: Result, name: str) -> dict[str, Floats]:
     return {side: values[:, k] for k, side in enumerate(("left", "right"))}
 
 
-def _places(one: Result, other: Result) -> tuple[Floats, Floats]:
+def _places(first: Result, second: Result) -> tuple[Floats, Floats]:
     """Return where the leading wheelsets of two results are over time [m]."""
-    if "wheelset_distance" in one and "wheelset_distance" in other:
-        return one["wheelset_distance"][:, 0], other["wheelset_distance"][:, 0]
-    return one["distance"], other["distance"]
+    if "wheelset_distance" in first and "wheelset_distance" in second:
+        return first["wheelset_distance"][:, 0], second["wheelset_distance"][:, 0]
+    return first["distance"], second["distance"]
 
 
-def _shared(positions: Floats, others: Floats) -> Any:
+def _within(positions: Floats, others: Floats) -> Any:
     """Which positions lie within others."""
     return (positions >= others[0]) & (positions <= others[-1])
 
 
 def comparison_table(rows: Sequence[Comparison]) -> Table:
     """Return comparisons with one line for each value, SI."""
-    words = "quantity", "unit", "where", "result", "value", "wheelset", "side"
-    columns: list[Column | str] = [*words, *PLACE, "difference"]
+    names = "quantity", "unit", "where", "result", "value", "wheelset", "side"
+    columns: list[Column | str] = [*names, *PLACE, "difference"]
     lines = []
     for row in rows:
         values = row.record()["values"].items()
@@ -261,8 +261,8 @@ def comparison_tables(rows: Sequence[Comparison], results: Mapping[str, Result])
         place = "peaks" if row.where in WORDS.values() else row.where
         by_place.setdefault(place, []).append(row)
     return [
-        Table([Column("quantity", place), *_COLUMNS], _compared(found, results))
-        for place, found in by_place.items()
+        Table([Column("quantity", place), *_COLUMNS], _table_rows(members, results))
+        for place, members in by_place.items()
     ]
 
 
@@ -270,29 +270,29 @@ _PLACE: tuple[Any, ...] = ("result", "wheelset", "side", Column("value", format=
 _COLUMNS = (Column("words", " "), *_PLACE, Column("difference", "difference", "%", "+.2f"))
 
 
-def _compared(rows: Sequence[Comparison], results: Mapping[str, Result]) -> Iterator[list[Any]]:
+def _table_rows(rows: Sequence[Comparison], results: Mapping[str, Result]) -> Iterator[list[Any]]:
     for row in rows:
         by_sign = row.where in (WORDS["max"], WORDS["min"])
-        words = f"{row.quantity.words}, {row.where}" if by_sign else row.quantity.words
+        text = f"{row.quantity.words}, {row.where}" if by_sign else row.quantity.words
         differences = row.differences
         for index, (label, peak) in enumerate(row.peaks.items()):
             name = peak.labels.get("wheelset", "")
             undefined = index == 0 or isnan(differences[label])
             yield [
-                *(("", "") if index else (row.quantity.name, words)), label,
+                *(("", "") if index else (row.quantity.name, text)), label,
                 f"{results[label].wheelsets.index(name) + 1}" if name else "",
                 peak.labels.get("side", ""), Amount(peak.value, Column.of(row.quantity)), peak.time,
                 peak.distance, None if undefined else differences[label],
             ]  # fmt: skip
 
 
-def difference_table(found: Sequence[Difference]) -> Table:
+def difference_table(differences: Sequence[Difference]) -> Table:
     """Return the largest differences along the track."""
     largest = Column("largest_difference", "largest difference", format=">")
-    where = Column("quantity", "along the track, leading wheelset"), "result", "side"
+    heads = Column("quantity", "along the track, leading wheelset"), "result", "side"
     rows = []
-    for one in found:
-        value = Amount(one.largest[0], Column.of(one.quantity))
-        side = one.labels.get("side", "")
-        rows.append([one.quantity.words, one.result, side, value, one.largest[1]])
-    return Table([*where, largest, PLACE[1]], rows)
+    for d in differences:
+        value = Amount(d.largest[0], Column.of(d.quantity))
+        side = d.labels.get("side", "")
+        rows.append([d.quantity.words, d.result, side, value, d.largest[1]])
+    return Table([*heads, largest, PLACE[1]], rows)

@@ -47,7 +47,7 @@ def shown_unit(unit: str) -> str:
     return SHOWN.get(unit, "" if unit == "1" else unit)
 
 
-def shown(value: float, unit: str, digits: int = 6) -> str:
+def with_unit(value: float, unit: str, digits: int = 6) -> str:
     """Return an SI value in the unit in which it is shown, with that unit."""
     name = shown_unit(unit)
     return f"{value * SHOWN_UNITS.get(name, ('', 1.0))[1]:.{digits}g} {name}".rstrip()

@@ -86,11 +86,11 @@ def fault_lines(faults: Iterable[Fault]) -> list[str]:
     >>> fault_lines(Fault("a.toml", f"bodies.b{k}.mass", "found 0", "> 0") for k in range(20))
     ['a.toml: bodies.b0.mass: found 0; > 0 (and 19 more: bodies.b1.mass ... bodies.b19.mass)']
     """
-    alike: dict[tuple[str, str, str], list[Fault]] = {}
+    groups: dict[tuple[str, str, str], list[Fault]] = {}
     for fault in faults:
-        alike.setdefault((fault.file, fault.found, fault.allowed), []).append(fault)
+        groups.setdefault((fault.file, fault.found, fault.allowed), []).append(fault)
     lines = []
-    for group in alike.values():
+    for group in groups.values():
         keys = [fault.key for fault in group]
         if len(group) <= EQUAL or not all(keys):
             lines += [str(fault) for fault in group]
@@ -99,10 +99,10 @@ def fault_lines(faults: Iterable[Fault]) -> list[str]:
     return lines
 
 
-def words_of(error: OSError | MemoryError) -> str:
+def message_of(error: OSError | MemoryError) -> str:
     """Return what the system refused, in a line: no space on the device, no memory.
 
-    >>> words_of(OSError(28, "no space left on device", "run.h5"))
+    >>> message_of(OSError(28, "no space left on device", "run.h5"))
     'No space left on device: run.h5'
     """
     if isinstance(error, MemoryError):
@@ -113,25 +113,25 @@ def words_of(error: OSError | MemoryError) -> str:
     return os.strerror(error.errno) + (f": {error.filename}" if error.filename else "")
 
 
-def counted(faults: Iterable[Fault]) -> list[Fault]:
+def merge_similar(faults: Iterable[Fault]) -> list[Fault]:
     """Return faults of the rows of a file, those of one kind as one with their number.
 
     Faults are of one kind where file and remedy agree.
 
     >>> rows = [Fault("a.csv", f"line {n}", "not a number", "numbers only") for n in range(2, 22)]
-    >>> print(*counted(rows))
+    >>> print(*merge_similar(rows))
     a.csv: line 2: not a number, and 19 more like it up to line 21; numbers only
     """
     kinds: dict[tuple[str, str], list[Fault]] = {}
     for fault in faults:
         kinds.setdefault((fault.file, fault.allowed), []).append(fault)
-    found = []
+    merged = []
     for first, *others in kinds.values():
         if others:
             more = f"{first.found}, and {len(others)} more like it up to {others[-1].key}"
             first = replace(first, found=more)
-        found.append(first)
-    return found
+        merged.append(first)
+    return merged
 
 
 class RailsimError(Exception):

@@ -95,7 +95,7 @@ class Quantity:
         """
         rotation = COMPONENTS.index(name) >= 3
 
-        def own(units: str) -> str:
+        def one_unit(units: str) -> str:
             return units.split(", ")[-1 if rotation else 0]
 
         symbol = {"roll": r"\varphi", "pitch": r"\theta", "yaw": r"\psi"}.get(name, name)
@@ -103,7 +103,7 @@ class Quantity:
             symbol = f"{'M' if rotation else 'F'}_{'xyz'[COMPONENTS.index(name) % 3]}"
         dots = {"body_velocity": r"\dot ", "body_acceleration": r"\ddot "}.get(self.name, "")
         return replace(self, long_name=f"{self.long_name}, {name}", symbol=f"{dots}{symbol}",
-                       unit=own(self.unit), shown_unit=own(self.shown_unit))  # fmt: skip
+                       unit=one_unit(self.unit), shown_unit=one_unit(self.shown_unit))  # fmt: skip
 
 
 _RUN = ("time",)
@@ -117,13 +117,13 @@ PATCHES = ("tread", "flange root", "flange")
 
 
 def _row(
-    name: str, words: str, symbol: str, shown: str, dims: tuple[str, ...],
+    name: str, long_name: str, symbol: str, shown: str, dims: tuple[str, ...],
     formula: Formula | None = None,
 ) -> Quantity:  # fmt: skip
-    known = [SHOWN_UNITS.get(unit, (unit, 1.0)) for unit in shown.split(", ")]
-    unit = ", ".join(stored for stored, _ in known)
+    pairs = [SHOWN_UNITS.get(unit, (unit, 1.0)) for unit in shown.split(", ")]
+    unit = ", ".join(stored for stored, _ in pairs)
     return Quantity(
-        name, words, symbol, unit, dims, shown, known[0][1], SIGNS.get(name, ""), "", formula
+        name, long_name, symbol, unit, dims, shown, pairs[0][1], SIGNS.get(name, ""), "", formula
     )
 
 
@@ -151,7 +151,7 @@ def frictional_power(values: Mapping[str, Any]) -> Any:
     return values["speed"][:, None, None] * work
 
 
-def _requested(key: str, *rows: Quantity) -> tuple[Quantity, ...]:
+def _on_request(key: str, *rows: Quantity) -> tuple[Quantity, ...]:
     return tuple(replace(row, request=key) for row in rows)
 
 
@@ -257,18 +257,18 @@ QUANTITIES = {
 REQUESTED = {
     row.name: row
     for row in (
-        *_requested("elements",
+        *_on_request("elements",
             _row("element_deflection", "deflection of the element", "d", "mm, mrad", _ELEMENT),
             _row("element_force", "force of the element", "F", "kN, kN m", _ELEMENT),
             _row("element_power", "power of the element", "P", "kW", ("time", "element")),
             _row("element_command", "command of the element", "u", "SI", ("time", "element"))),
-        *_requested("frictional_power",
+        *_on_request("frictional_power",
             _row("frictional_power", "frictional power of the wheel", "P_f", "kW", _WHEEL,
                  frictional_power)),
-        *_requested("drives",
+        *_on_request("drives",
             _row("axle_torque", "torque of drives, brakes and actuators on the wheelset", "M_d",
                  "kN m", _AXLE)),
-        *_requested("contact_patches",
+        *_on_request("contact_patches",
             _row("patch_N", "normal force of the patch", "N", "kN", _PATCH),
             _row("patch_pressure", "largest pressure of the patch", "p_{max}", "MPa", _PATCH),
             _row("patch_a", "semi-axis of the patch along the rail", "a", "mm", _PATCH),
@@ -281,11 +281,11 @@ REQUESTED = {
             _row("patch_T_y", "lateral creep force", "T_y", "kN", _PATCH),
             _row("patch_T_gamma", "wear number of the patch", r"T\gamma_c", "N", _PATCH),
             _row("patch_friction", "coefficient of friction of the patch", r"\mu", "1", _PATCH)),
-        *_requested("check_rail",
+        *_on_request("check_rail",
             _row("check_rail_force", "force of the check rail", "F_c", "kN", _WHEEL),
             _row("check_rail_T_gamma", "wear number of the check rail", r"T\gamma_{cr}", "N",
                  _WHEEL)),
-        *_requested("sensors",
+        *_on_request("sensors",
             _row("sensor_acceleration", "reading of the accelerometer", "a", "m/s2", _SENSOR),
             _row("sensor_roll_rate", "roll velocity of the body", r"\dot\varphi", "rad/s",
                  ("time", "sensor")),
@@ -293,7 +293,7 @@ REQUESTED = {
                  _SENSOR),
             _row("sensor_velocity", "velocity of the point", "v", "m/s", _SENSOR),
             _row("sensor_displacement", "displacement of the point", "u", "mm", _SENSOR)),
-        *_requested("track",
+        *_on_request("track",
             _row("wheelset_lateral_on_track",
                  "wheelset lateral displacement from the design track", "y_0", "mm", _AXLE),
             _row("wheelset_roll_on_track", "wheelset roll angle against the design track",

@@ -42,7 +42,7 @@ BASE = """<!DOCTYPE html>
 """
 
 
-def rendered(
+def render_page(
     package: str,
     template: str,
     *,

@@ -22,9 +22,9 @@ def use_plotter(function: Callable[..., "Figure"]) -> Callable[..., "Figure"]:
     return function
 
 
-def picture_of(thing: object, path: str | Path | None, overwrite: bool, **how: Any) -> "Figure":
-    """Draw an object and write what is drawn to `path`; `how` are options of its drawing."""
-    return _plotters[0](thing, path=path, overwrite=overwrite, **how)
+def draw_figure(item: object, path: str | Path | None, overwrite: bool, **options: Any) -> "Figure":
+    """Draw an object and write what is drawn to `path`; `options`: of its drawing."""
+    return _plotters[0](item, path=path, overwrite=overwrite, **options)
 
 
 def image_tag(figure: "Figure") -> str:
@@ -62,4 +62,4 @@ class Plottable:
         The suffix of the file tells its kind.  Raises InputError: it exists and may not be
         overwritten, or cannot be written.
         """
-        return picture_of(self, path, overwrite, title=title)
+        return draw_figure(self, path, overwrite, title=title)

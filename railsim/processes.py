@@ -22,7 +22,7 @@ from multiprocessing.process import BaseProcess
 from types import ModuleType
 from typing import Any
 
-from railsim.threads import environment_kept, one_thread_each
+from railsim.threads import one_thread_each, restored_environment
 
 PRELOADED = "railsim.studies.worker"
 REQUESTS = tuple(
@@ -64,7 +64,7 @@ def workers_begin() -> Iterator[None]:
     process, where it calls railsim again unless it has Python's guard: workers do not need it.
     """
     script = sys.modules["__main__"]
-    with environment_kept("PYTHONSAFEPATH"), one_thread_each():
+    with restored_environment("PYTHONSAFEPATH"), one_thread_each():
         os.environ["PYTHONSAFEPATH"] = "1"
         sys.modules["__main__"] = ModuleType("__main__")
         try:
@@ -103,10 +103,10 @@ class WorkerPool(ProcessPoolExecutor):
         context: Any = worker_context()
         super().__init__(count, context, begin or begin_worker, arguments)
 
-    def submit(self, *task: Any, **named: Any) -> Future[Any]:
+    def submit(self, *task: Any, **options: Any) -> Future[Any]:
         """Submit a task, for which a process may begin."""
         with signals_later(), workers_begin():  # inherited by the process
-            future = super().submit(*task, **named)
+            future = super().submit(*task, **options)
             if len(self.begun) < self._count:
                 self.begun |= set(multiprocessing.active_children()) - self._others
         return future

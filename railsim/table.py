@@ -63,9 +63,9 @@ class Column:
         """
         unit = quantity.shown_unit
         decimals = DECIMALS.get(unit)
-        shown = ".4g" if decimals is None else f".{decimals}f"
+        format = ".4g" if decimals is None else f".{decimals}f"
         unit = "" if unit == "-" else unit
-        return cls(quantity.name, words or quantity.long_name, unit, shown, quantity.symbol)
+        return cls(quantity.name, words or quantity.long_name, unit, format, quantity.symbol)
 
     @property
     def si_unit(self) -> str:
@@ -91,7 +91,7 @@ class Column:
         """
         if isinstance(value, Amount):
             unit = f" {value.column.unit}" if value.with_unit and value.column.unit else ""
-            return value.column._beside(value.value, value.limit) + unit
+            return value.column._text_beside(value.value, value.limit) + unit
         if value is None:
             return ""
         if isinstance(value, bool) or not isinstance(value, Real):
@@ -101,7 +101,7 @@ class Column:
         without_minus_zero = self.format.replace(".", "z.", 1 if self.format.endswith("f") else 0)
         return format(value * self.scale, without_minus_zero)
 
-    def _beside(self, value: Any, limit: float | None) -> str:
+    def _text_beside(self, value: Any, limit: float | None) -> str:
         text = self.text(value)
         if limit is None or text != self.text(limit):
             return text
@@ -143,7 +143,7 @@ class Table:
         rows: Iterable[Sequence[Any] | Mapping[str, Any]],
         caption: str = "",
     ) -> None:
-        self.columns = [Column(one) if isinstance(one, str) else one for one in columns]
+        self.columns = [Column(column) if isinstance(column, str) else column for column in columns]
         self.caption = caption
         names = [column.name for column in self.columns]
         self.rows = [
@@ -186,7 +186,7 @@ class Table:
         """
         cells = [[printable(column.heading) for column in self.columns], *self.texts()]
         if colour or width is not None:
-            lines = self._drawn(cells, width or 100_000, colour)
+            lines = self._draw(cells, width or 100_000, colour)
         else:  # rich takes 0.2 ms a cell
             widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
             signs = [">" if column.format else "<" for column in self.columns]
@@ -195,26 +195,26 @@ class Table:
         lines = [re.sub(r" +((?:\x1b\[0m)?)$", r"\1", line).rstrip() for line in lines]
         return [printable(self.caption), *lines] if self.caption else lines
 
-    def _drawn(self, cells: list[list[str]], width: int, colour: bool) -> list[str]:
+    def _draw(self, cells: list[list[str]], width: int, colour: bool) -> list[str]:
         from rich.console import Console
         from rich.table import Table as Drawn
         from rich.text import Text
 
-        gap, widths = _fitted(cells, [bool(column.format) for column in self.columns], width)
-        drawn = Drawn(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold")
+        gap, widths = _column_widths(cells, [bool(column.format) for column in self.columns], width)
+        grid = Drawn(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold")
         for column, heading, least in zip(self.columns, cells[0], widths, strict=True):
             justify: Any = "right" if column.format else "left"
-            folded = Text(_folded(heading, least))
-            drawn.add_column(folded, justify=justify, overflow="fold", width=least)
+            folded = Text(_fold(heading, least))
+            grid.add_column(folded, justify=justify, overflow="fold", width=least)
         for row in cells[1:]:
             parts = zip(row, widths, strict=True)
-            drawn.add_row(*(Text(_folded(cell, least), _style(cell)) for cell, least in parts))
+            grid.add_row(*(Text(_fold(cell, least), _style(cell)) for cell, least in parts))
         stream = io.StringIO()
         console = Console(
             file=stream, width=max(width, sum(widths) + gap * len(widths)), force_terminal=colour,
             color_system="standard" if colour else None, legacy_windows=False, _environ={},
         )  # fmt: skip
-        console.print(drawn)
+        console.print(grid)
         return stream.getvalue().splitlines()
 
     def html(self) -> str:
@@ -222,11 +222,11 @@ class Table:
         classes = ["" if column.format else ' class="words"' for column in self.columns]
 
         def line(cells: Iterable[str], tag: str, kind: str = "") -> str:
-            marked = (
+            tagged = (
                 f"<{tag}{words}>{escape(printable(cell))}</{tag}>"
                 for words, cell in zip(classes, cells, strict=True)
             )
-            return f"<tr{kind}>{''.join(marked)}</tr>"
+            return f"<tr{kind}>{''.join(tagged)}</tr>"
 
         title = f"<caption>{escape(printable(self.caption))}</caption>" if self.caption else ""
         head = line((column.heading for column in self.columns), "th")
@@ -278,7 +278,7 @@ def beside_ends(value: float, ends: Sequence[float], digits: int = 0) -> str:
     return beside(value, min(ends, key=lambda end: abs(end - value)), digits)
 
 
-def _fitted(
+def _column_widths(
     cells: Sequence[Sequence[str]], numbers: Sequence[bool], width: int
 ) -> tuple[int, list[int]]:
     """Return the gap between columns and their widths, in characters.
@@ -287,23 +287,23 @@ def _fitted(
     share what is left; where even that is too little, texts are broken anywhere.
     """
     columns = list(zip(*cells, strict=True))
-    wanted = [max(1, *map(len, column)) for column in columns]
+    longest = [max(1, *map(len, column)) for column in columns]
     least = []
     for number, (heading, *texts) in zip(numbers, columns, strict=True):
         parts = texts if number else [part for text in texts for part in _parts(text)]
         least.append(max(1, *(len(part.strip()) for part in [*_parts(heading), *parts])))
     gap = 2 if sum(least) + 2 * len(least) <= width else 1
     room = width - gap * len(least)
-    if sum(wanted) <= room:
-        return gap, wanted
+    if sum(longest) <= room:
+        return gap, longest
     texts = [k for k, number in enumerate(numbers) if not number]
     while sum(least) > room and any(least[k] > NARROWEST for k in texts):
         least[max(texts, key=least.__getitem__)] -= 1
     widths = list(least)
-    by_need = sorted(range(len(widths)), key=lambda k: wanted[k] - widths[k])
+    by_need = sorted(range(len(widths)), key=lambda k: longest[k] - widths[k])
     for rank, k in enumerate(by_need):
         share = max(room - sum(widths), 0) // (len(by_need) - rank)
-        widths[k] += min(wanted[k] - widths[k], share)
+        widths[k] += min(longest[k] - widths[k], share)
     return gap, widths
 
 
@@ -312,7 +312,7 @@ def _parts(text: str) -> list[str]:
     return re.split(r"(?=\s)(?<=\S)|(?<=[._/])(?=[A-Za-z])", text)
 
 
-def _folded(text: str, width: int) -> str:
+def _fold(text: str, width: int) -> str:
     """Return a text in lines of a width, broken where words and dotted names allow."""
     lines = [""]
     for part in _parts(text) if len(text) > width else [text]:

@@ -78,32 +78,32 @@ def spreadsheet_cell(value: object) -> object:
 _VARYING = re.compile(r"\w+(?:\.\w+)+|\d+(?:\.\d+)?(?:e[+-]?\d+)?|\b(?:left|right)\b")
 
 
-def counted_remarks(remarks: Iterable[tuple[str, str]]) -> list[str]:
+def merge_remarks(remarks: Iterable[tuple[str, str]]) -> list[str]:
     """Return remarks on runs, those that differ in numbers and names alone as one with a count.
 
     `remarks`: Name of the run, or nothing; remark.
 
-    >>> counted_remarks([("a", "hunts at 5 Hz"), ("b", "hunts at 6 Hz"), ("c", "is too long")])
+    >>> merge_remarks([("a", "hunts at 5 Hz"), ("b", "hunts at 6 Hz"), ("c", "is too long")])
     ['a: hunts at 5 Hz (and 1 similar, in 2 runs altogether)', 'c: is too long']
-    >>> counted_remarks([("a", "is too long"), ("b", "is too long")])
+    >>> merge_remarks([("a", "is too long"), ("b", "is too long")])
     ['2 runs: is too long']
     """
-    alike: dict[str, dict[tuple[str, str], None]] = {}
+    groups: dict[str, dict[tuple[str, str], None]] = {}
     for run, text in remarks:
-        alike.setdefault(_VARYING.sub("#", text), {})[run, text] = None
-    found = []
-    for group in alike.values():
+        groups.setdefault(_VARYING.sub("#", text), {})[run, text] = None
+    lines = []
+    for group in groups.values():
         run, text = next(iter(group))
         runs = len({name for name, _ in group if name})
         if runs > 1 and len({text for _, text in group}) == 1:
-            found.append(f"{runs} runs: {text}")
+            lines.append(f"{runs} runs: {text}")
             continue
-        where = f", in {runs} runs altogether" if runs > 1 else ""
-        more = f" (and {len(group) - 1} similar{where})" if len(group) > 1 else ""
-        found.append(
+        runs_text = f", in {runs} runs altogether" if runs > 1 else ""
+        more = f" (and {len(group) - 1} similar{runs_text})" if len(group) > 1 else ""
+        lines.append(
             (f"{run}: " if run else "") + (text.removesuffix(".") if more else text) + more
         )
-    return found
+    return lines
 
 
 def plain(data: Any) -> Any:

@@ -21,7 +21,7 @@ def use_one_thread() -> None:
 
 
 @contextmanager
-def environment_kept(*names: str) -> Iterator[None]:
+def restored_environment(*names: str) -> Iterator[None]:
     """Let variables of the environment be after the block what they were before."""
     before = {name: os.environ.get(name) for name in names}
     try:
@@ -36,7 +36,7 @@ def environment_kept(*names: str) -> Iterator[None]:
 @contextmanager
 def one_thread_each() -> Iterator[None]:
     """Let processes that are started within the block use one thread each."""
-    with environment_kept(*VARIABLES):
+    with restored_environment(*VARIABLES):
         use_one_thread()
         yield
 

@@ -23,8 +23,8 @@ def number_with_unit(text: str) -> float | None:
     >>> number_with_unit("72km/h"), number_with_unit("-2.5 mm"), number_with_unit("60E1")
     (20.0, -0.0025, None)
     """
-    found = _WITH_UNIT.fullmatch(text.strip())
-    return rounded(float(found[1]) * UNITS[found[2]]) if found else None
+    match = _WITH_UNIT.fullmatch(text.strip())
+    return rounded(float(match[1]) * UNITS[match[2]]) if match else None
 
 
 def speed_in_si(value: Any) -> Any:
@@ -33,8 +33,8 @@ def speed_in_si(value: Any) -> Any:
     >>> speed_in_si("72 km/h"), speed_in_si("20"), speed_in_si(20.0), speed_in_si("20 kN")
     (20.0, 20.0, 20.0, '20 kN')
     """
-    found = _SPEED.fullmatch(value.strip()) if isinstance(value, str) else None
-    return rounded(float(found[1]) * UNITS[found[2] or "m/s"]) if found else value
+    match = _SPEED.fullmatch(value.strip()) if isinstance(value, str) else None
+    return rounded(float(match[1]) * UNITS[match[2] or "m/s"]) if match else value
 
 
 def range_values(text: str) -> list[float] | None:
@@ -48,16 +48,16 @@ def range_values(text: str) -> list[float] | None:
     >>> range_values("36km/h:72km/h:2"), range_values("36:72km/h:2")
     ([10.0, 20.0], None)
     """
-    found = _RANGE.fullmatch(text.strip())
-    if not found or (found[3] or found[7]) != (found[5] or found[7]) or (found[3] and found[7]):
+    match = _RANGE.fullmatch(text.strip())
+    if not match or (match[3] or match[7]) != (match[5] or match[7]) or (match[3] and match[7]):
         return None
-    first, last, number = float(found[2]), float(found[4]), int(found[6])
+    first, last, number = float(match[2]), float(match[4]), int(match[6])
     least = 1 if first == last else 2  # of two ends one would be left out
     if not least <= number <= MOST_VALUES:
         raise ValueError(f"a range of {number}; {least} to {MOST_VALUES} values are allowed")
-    scale = UNITS[found[3] or found[7] or "m"]
+    scale = UNITS[match[3] or match[7] or "m"]
     shares = [k / (number - 1) if number > 1 else 0.0 for k in range(number)]
-    if found[1]:
+    if match[1]:
         if not first * last > 0.0:
             raise ValueError("equal ratios need two ends of the same sign, neither zero")
         return [rounded(scale * first * (last / first) ** share) for share in shares]

@@ -18,7 +18,7 @@ import railsim.model.solutions
 from railsim.contact.table import TableGrid
 from railsim.kernels import lanes_plain
 from railsim.laws import PERMITTED
-from railsim.threads import environment_kept
+from railsim.threads import restored_environment
 
 gc.disable()  # until all is collected
 ROOT = Path(__file__).parent.parent
@@ -52,7 +52,7 @@ def permitted_laws():
     In an environment that is not that of the server of workers, all workers begin by themselves:
     two seconds each.
     """
-    with environment_kept(PERMITTED):
+    with restored_environment(PERMITTED):
         yield
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from railsim.animation.scene import Scene
 from railsim.files.access import check_file, whole_file
 from railsim.notation import QUANTITIES
-from railsim.page import rendered
+from railsim.page import render_page
 
 ENDINGS = (".html", ".htm")
 
@@ -25,7 +25,7 @@ def write_page(
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=ENDINGS)
-    text = rendered(
+    text = render_page(
         "railsim.animation", "page.html", title=scene.title, styles=["page.css"],
         scripts=["page.js"], data=scene_data(scene) | {"modes": [_motion(mode) for mode in modes]},
         schemes="light dark",

@@ -14,7 +14,7 @@ from railsim.assessment.verdict import DERAILED, FAIL, Verdict
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits, RunningLimits
-from railsim.plottable import picture_of
+from railsim.plottable import draw_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,7 +114,7 @@ class Assessment:
 
     def plot(self, path: str | Path | None = None, *, overwrite: bool = False) -> "Figure":
         """Draw estimates against limits, comfort or wear; also into the file of `path`."""
-        return picture_of(self, path, overwrite)
+        return draw_figure(self, path, overwrite)
 
     def record(self) -> dict[str, object]:
         """Return the assessment as plain numbers and strings, SI."""

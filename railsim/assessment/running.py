@@ -215,29 +215,29 @@ def _service(runs: Mapping[str, Result]) -> Service:
 
 def _load_section_file(file: str | Path, runs: Mapping[str, Result]) -> tuple[str, OwnSections]:
     """Return a file of sections, each on the track of a run."""
-    listed, tracks = load_own_sections(file), {result.track().name for result in runs.values()}
+    by_user, tracks = load_own_sections(file), {result.track().name for result in runs.values()}
     Faults(
         Fault(str(file), f"sections.{k}.track", f"'{s.track}'", nearest(s.track, tracks))
-        for k, s in enumerate(listed.sections)
+        for k, s in enumerate(by_user.sections)
         if s.track and s.track not in tracks
     ).check()
-    return str(file), listed
+    return str(file), by_user
 
 
 def _sections(
-    record: Record, limits: RunningLimits, service: Service, listed: tuple[str, OwnSections] | None
+    record: Record, limits: RunningLimits, service: Service, by_user: tuple[str, OwnSections] | None
 ) -> list[TestSection]:
     """Return the sections of a run; raises InputError where it lacks a quantity, or one of these.
 
-    `listed`: Those of a file of the user's own, in place of those cut from the track.
+    `by_user`: Those of a file of the user's own, in place of those cut from the track.
     """
     record.need_quantities(limits.standard)
     if "Q0" not in record.result:
         raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
     covered, track = record.covered(), record.result.track()
-    if listed is None:
+    if by_user is None:
         return track_sections(track, limits, service, covered, record.speed_at)
-    file, sections = listed[0], listed[1].sections
+    file, sections = by_user[0], by_user[1].sections
     on_track = [(k, s) for k, s in enumerate(sections) if s.track in (None, track.name)]
     most = f"{math.ceil(covered[0])} to {math.floor(covered[1])} m"
     allowed = f"within {most}, where all of the vehicle was in the run {record.name}"

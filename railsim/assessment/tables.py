@@ -16,7 +16,7 @@ from railsim.assessment.wear import LAWS
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.table import Amount, Column, Table
-from railsim.text import counted_remarks, spreadsheet_cell
+from railsim.text import merge_remarks, spreadsheet_cell
 
 _SHARE = Column("share", "% of limit", format=".1f")
 SHORT = {"one": "1-dim.", "two": "2-dim.", "largest": "largest", "smallest": "smallest"}
@@ -194,7 +194,7 @@ def assessment_lines(assessment: Assessment, *, quiet: bool) -> list[str | Table
     for table in tables(assessment):
         lines += ["", table]
     left_out = [remark for remark in assessment.remarks if remark.startswith(LEFT_OUT)]
-    remarks = left_out if quiet else [*left_out, *counted_remarks(_remarks_by_run(assessment))]
+    remarks = left_out if quiet else [*left_out, *merge_remarks(_remarks_by_run(assessment))]
     between = [""] * (not quiet or bool(left_out))
     return [*lines, *between, *(f"remark: {remark}" for remark in remarks)]
 

@@ -23,7 +23,7 @@ from railsim.cli import interrupts
 from railsim.cli.common import DONE, ENDED_EARLY, FAILED, LIMIT_EXCEEDED, WRONG_INPUT
 from railsim.cli.interrupts import Interrupted
 from railsim.cli.terminal import echo, print_json
-from railsim.errors import InputError, ModelError, RailsimError, fault_lines, nearest, words_of
+from railsim.errors import InputError, ModelError, RailsimError, fault_lines, message_of, nearest
 from railsim.files.access import remove_partial_files
 from railsim.threads import use_one_thread
 from railsim.version import __version__
@@ -149,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:  # nobody can read what is printed: a full disk behind `>`
         interrupts.silence()
         with suppress(OSError):
-            echo(f"railsim: {words_of(error)}", err=True)
+            echo(f"railsim: {message_of(error)}", err=True)
         return FAILED
     return status
 
@@ -177,7 +177,7 @@ def _status(command_line: Sequence[str] | None) -> int:
         except BrokenPipeError:
             raise
         except (OSError, MemoryError) as error:
-            echo(f"railsim: {words_of(error)}", err=True)
+            echo(f"railsim: {message_of(error)}", err=True)
             return FAILED
         except Exception as error:
             from railsim.cli.fault_report import write_report

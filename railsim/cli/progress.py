@@ -15,7 +15,7 @@ from typing import Any
 
 from railsim.cli.interrupts import raise_pending_signal
 from railsim.cli.terminal import echo
-from railsim.text import counted_remarks
+from railsim.text import merge_remarks
 
 PATIENCE = 2.0  # seconds between looks at what the program is doing
 BETWEEN = 60.0  # seconds between lines in a log
@@ -149,7 +149,7 @@ class RunLines:
     def end(self, *, remarks: bool = True) -> None:
         """Print what is left: the last runs, and the remarks with the number of runs."""
         self._print_last()
-        for text in counted_remarks(self._remarks) if remarks else ():
+        for text in merge_remarks(self._remarks) if remarks else ():
             echo(f"remark: {text}")
 
     def _print_last(self) -> None:

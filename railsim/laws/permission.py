@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, Faults
-from railsim.threads import environment_kept
+from railsim.threads import restored_environment
 
 D = TypeVar("D", Vehicle, Track)
 PERMITTED = "RAILSIM_LAWS"
@@ -32,7 +32,7 @@ def allow(*sources: str) -> None:
 @contextmanager
 def allowed(everything: bool) -> Iterator[None]:
     """Permit all sources within a block, or change nothing."""
-    with environment_kept(PERMITTED):
+    with restored_environment(PERMITTED):
         if everything:
             allow()
         yield

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from railsim.definitions.mechanism.faults import bounds_of, bounds_remarks
-from railsim.design_checks import NEAR_BOUND, check_table, shown, shown_unit
+from railsim.design_checks import NEAR_BOUND, check_table, shown_unit, with_unit
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import compare
@@ -68,7 +68,7 @@ def parameter_table(result: Analysis) -> Table:
     """Return every parameter with its unit and where it is from."""
     definition = result.definition
     rows = [
-        [name, shown(value, definition.unit_of(name), 8), definition.provenance_of(name)]
+        [name, with_unit(value, definition.unit_of(name), 8), definition.provenance_of(name)]
         for name, value in parameter_data(result).items()
     ]
     return Table(["parameter", Column("value", format=">"), "provenance"], rows)
@@ -81,7 +81,7 @@ def published_table(result: Analysis) -> Table:
         unit = "rad" if name in result.min_angles else "m"
         if name in ("travel", "max_force", "min_force"):
             unit = quantity(name.rpartition("_")[2], result.definition).si_unit
-        cells = [shown(both[key], unit, 8) for key in ("published", "ours")]
+        cells = [with_unit(both[key], unit, 8) for key in ("published", "ours")]
         rows.append([name, *cells, both["ours"] / both["published"] - 1.0])
     numbers = [Column("published", format=">"), Column("computed", format=">")]
     return Table(["result", *numbers, Column("relative difference", format="+.1e")], rows)
@@ -233,7 +233,7 @@ def optimum_sentences(optimum: "Optimum") -> list[str]:
     if not optimum.feasible:
         angles = optimum.after.min_angles
         breaches = ", ".join(
-            f"{name} by {shown(value, 'rad') if name in angles else f'{value:.6g}'}"
+            f"{name} by {with_unit(value, 'rad') if name in angles else f'{value:.6g}'}"
             for name, value in optimum.breaches.items()
         )
         found.append(f"no start keeps all constraints; least broken (SI): {breaches}")
@@ -244,7 +244,7 @@ def optimum_tables(optimum: "Optimum") -> list[Table]:
     """Return parameters before and after, limits that hold the optimum, and the starts."""
     unit_of = optimum.definition.unit_of
     changed = [
-        [name, shown(optimum.own[name], unit_of(name), 8), shown(value, unit_of(name), 8)]
+        [name, with_unit(optimum.own[name], unit_of(name), 8), with_unit(value, unit_of(name), 8)]
         for name, value in optimum.parameters.items()
     ]
     number = Column("slack", "slack (SI)", format=".3g")

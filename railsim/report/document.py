@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from railsim import table as values
 from railsim.design_checks import Check, verdict
-from railsim.page import rendered
+from railsim.page import render_page
 from railsim.plot.style import styled
 from railsim.version import __version__
 
@@ -121,7 +121,7 @@ def document(
     **values: Any,
 ) -> str:
     """Return the page as HTML; `values` go to the template."""
-    return rendered(
+    return render_page(
         "railsim.report", "templates/document.html", title=title, styles=["templates/document.css"],
         schemes="light dark", sections=[s for s in sections if s.texts or s.tables or s.drawings],
         method=method, verdict=verdict, lead=f"{source}Written by railsim {__version__}.", **values,

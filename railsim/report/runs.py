@@ -18,7 +18,7 @@ from railsim.assessment.record import RUNNING
 from railsim.assessment.tables import tables
 from railsim.errors import listed
 from railsim.notation import QUANTITIES
-from railsim.page import rendered
+from railsim.page import render_page
 from railsim.plot.assessment import assessment_figure
 from railsim.report import document as doc
 from railsim.report import spread
@@ -85,7 +85,7 @@ def page(
     sections += [*_published(every), *measured]
     sections.append(inputs_section(run_inputs, every, inputs))
     sections.append(_remarks(records, remarks))
-    return rendered(
+    return render_page(
         "railsim.report", "templates/runs.html", title=title,
         styles=["vendor/uPlot.min.css", "templates/runs.css"],
         scripts=["vendor/uPlot.iife.min.js", "templates/study.js", "templates/runs.js"], data=data,

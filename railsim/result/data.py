@@ -19,7 +19,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.errors import changed_faults, nearest, optional_package
 from railsim.notation import Quantity
-from railsim.plottable import image_tag, picture_of
+from railsim.plottable import draw_figure, image_tag
 from railsim.profiles.profile import Profile
 from railsim.result.labels import chosen_names, index_of
 from railsim.table import Table
@@ -353,7 +353,7 @@ class Result:
             A quantity or label that the result does not have; the file exists.
         """
         selection = {"selections": quantities} if quantities else {}
-        return picture_of(self, path, overwrite, over=over, by=by, between=between, **selection)
+        return draw_figure(self, path, overwrite, over=over, by=by, between=between, **selection)
 
     # -- elsewhere ----------------------------------------------------------------------------
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from railsim.definitions.study.analyses import unit_of_number
-from railsim.errors import Fault, Faults, RailsimError, input_error, words_of
+from railsim.errors import Fault, Faults, RailsimError, input_error, message_of
 from railsim.files.access import is_file, read_text, whole_file
 from railsim.notation import QUANTITIES
 from railsim.result import Result
@@ -69,7 +69,7 @@ def failed_record(case: "Case", error: Exception | str) -> Record:
     """Return the record of a run without a result, with what the system refused, if anything."""
     facts: Record = {"status": "failed", "status_reason": str(error), "traceback": ""}
     if isinstance(error, OSError | MemoryError):
-        facts["status_reason"] = words_of(error)
+        facts["status_reason"] = message_of(error)
         if errno := getattr(error, "errno", None):
             facts["errno"] = errno
     elif isinstance(error, Exception) and not isinstance(error, RailsimError):

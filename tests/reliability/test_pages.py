@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from railsim.cli import main
-from railsim.page import rendered
+from railsim.page import render_page
 from railsim.profiles import load_profile
 
 sys.path.append(str(Path(__file__).parents[1] / "interface"))
@@ -176,4 +176,4 @@ def test_pages_of_hostile_files_work_and_run_nothing_else(tmp_path):
 def test_data_without_a_value_is_refused():
     """Infinite numbers are no JSON: the page would be empty."""
     with pytest.raises(ValueError, match="not JSON compliant"):
-        rendered("railsim.animation", "page.html", title="", styles=[], data=[float("nan")])
+        render_page("railsim.animation", "page.html", title="", styles=[], data=[float("nan")])

@@ -17,7 +17,7 @@ from railsim.definitions.embedding import embed, tables_of
 from railsim.definitions.excitations.base import CHANNELS, COLUMNS, rails_moved
 from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.excitations.recording import BANDS, band_passed, from_chord
-from railsim.errors import Fault, Faults, changed_faults, counted, input_error, nearest
+from railsim.errors import Fault, Faults, changed_faults, input_error, merge_similar, nearest
 from railsim.files.access import TABLE_BYTES, read_bytes
 
 UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3, "_in": 0.0254, "_ft": 0.3048}
@@ -142,7 +142,7 @@ def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None
     rows, mileage = _rows(used, values, how)
     faults += [(numbers[k], what, allowed) for k, what, allowed in _row_faults(rows, used, values)]
     faults.sort(key=lambda fault: fault[0])
-    Faults(counted(Fault(str(path), f"line {n}", *words) for n, *words in faults)).check()
+    Faults(merge_similar(Fault(str(path), f"line {n}", *words) for n, *words in faults)).check()
     if len(rows) < 4:
         raise input_error(path, f"{len(rows)} rows", "four rows at least")
     return _filtered(path, rows, how), mileage
