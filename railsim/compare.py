@@ -105,19 +105,19 @@ def conditions(results: Mapping[str, Result]) -> dict[str, list[str]]:
     ends = np.array([r["distance"][[0, -1]] for r in every])
     if np.ptp(ends, axis=0).max() >= 1.0:
         values["distance"] = [f"{begin:.6g} to {end:.6g}" for begin, end in ends]
-    differences = {key: words for key, words in values.items() if len(set(words)) > 1}
+    differences = {key: texts for key, texts in values.items() if len(set(texts)) > 1}
     if len(of_vehicle) <= MOST_KEYS or "vehicle" not in differences:
-        differences |= {f"vehicle.{key}": words for key, words in of_vehicle.items()}
-    differences |= {f"track.{key}": words for key, words in on_track.items()}
+        differences |= {f"vehicle.{key}": texts for key, texts in of_vehicle.items()}
+    differences |= {f"track.{key}": texts for key, texts in on_track.items()}
     of_settings = differing([result.settings() for result in every])
-    chosen = {key: words for key, words in of_settings.items() if not key.startswith("outputs.")}
-    return differences | {f"settings.{key}": words for key, words in chosen.items()}
+    chosen = {key: texts for key, texts in of_settings.items() if not key.startswith("outputs.")}
+    return differences | {f"settings.{key}": texts for key, texts in chosen.items()}
 
 
 def condition_table(conditions: Mapping[str, Sequence[str]], labels: Iterable[str]) -> Table:
     """Return the conditions that differ, those of each result in a column."""
     units = {"speed": "speed (m/s)", "distance": "distance (m)"}
-    rows = [[units.get(key, key), *words] for key, words in conditions.items()]
+    rows = [[units.get(key, key), *texts] for key, texts in conditions.items()]
     return Table(["conditions that differ", *map(printable, labels)], rows)
 
 

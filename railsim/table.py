@@ -223,8 +223,8 @@ class Table:
 
         def line(cells: Iterable[str], tag: str, kind: str = "") -> str:
             tagged = (
-                f"<{tag}{words}>{escape(printable(cell))}</{tag}>"
-                for words, cell in zip(classes, cells, strict=True)
+                f"<{tag}{attribute}>{escape(printable(cell))}</{tag}>"
+                for attribute, cell in zip(classes, cells, strict=True)
             )
             return f"<tr{kind}>{''.join(tagged)}</tr>"
 

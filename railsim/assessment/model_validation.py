@@ -34,7 +34,7 @@ from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, argument_error, input_error
 from railsim.measurement import Measurement, load_measurement
 from railsim.measurement.alignment import MOST_SHIFT, common_shift
-from railsim.measurement.counterpart import amplified, check_channels, compared, rests, series
+from railsim.measurement.counterpart import amplified, check_channels, counterparts, rests, series
 from railsim.measurement.likeness import suspicions
 from railsim.notation import SIDES
 from railsim.result import Result
@@ -228,7 +228,7 @@ class _Run:
     @classmethod
     def from_result(cls, run: Measurement, result: Result) -> "_Run":
         check_channels(run.name, run, result.vehicle())
-        selections = compared(run)
+        selections = counterparts(run)
         time, distance = result["time"], result["distance"]
         rate = (len(time) - 1) / float(time[-1] - time[0])
         simulated, faults = {}, Faults()

@@ -35,19 +35,19 @@ def check_outputs(
             found = f"without {', '.join(lacking)}"
             faults.append(Fault("settings", "outputs.quantities", found, allowed))
     rate = 1.0 / settings.output_interval(speed)
-    words, _ = record.coarseness(settings, rate)
+    found, _ = record.coarseness(settings, rate)
     key = "output_rate" if settings.output_spacing is None else "output_spacing"
     key = key if outputs.low_pass is None else "outputs.low_pass.frequency"
     allowed = record.ENOUGH
     if settings.output_spacing is not None and settings.drive.mode != "constant":
-        words, allowed = "unequal time steps, as the speed varies", "output_rate instead"
+        found, allowed = "unequal time steps, as the speed varies", "output_rate instead"
     elif coarse and outputs.low_pass is not None:
-        words, allowed = words if filters else "", f"{record.WIDE_ENOUGH:g} Hz at least"
+        found, allowed = found if filters else "", f"{record.WIDE_ENOUGH:g} Hz at least"
     elif coarse:
-        words = words if filters and rate < LEAST * (1.0 - 1e-3) else ""
+        found = found if filters and rate < LEAST * (1.0 - 1e-3) else ""
         allowed = f"at least {LEAST:g}, better {record.FINE_ENOUGH:g}"
-    if words:
-        faults.append(Fault("settings", key, words, allowed))
+    if found:
+        faults.append(Fault("settings", key, found, allowed))
     if standard in record.RUNNING and vehicle.service is None:
         allowed = "[service] with admissible_speed and cant_deficiency in its file"
         faults.append(Fault(f"vehicle '{vehicle.name}'", "service", "missing", allowed))

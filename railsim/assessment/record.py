@@ -226,7 +226,7 @@ class Record:
         motion["distance"] = self.distance[rows]
         return readings(self.sensors, motion, self.result.bodies, self.alignment, speed)
 
-    def covered(self) -> tuple[float, float]:
+    def covered_range(self) -> tuple[float, float]:
         """Range of arc length that the whole vehicle covered after the start [m]."""
         offsets = [*self.offsets, *(self.sensor_offset(name) for name in self.sensors)]
         ahead, behind = max(0.0, *offsets), min(0.0, *offsets)

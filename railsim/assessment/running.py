@@ -234,7 +234,7 @@ def _sections(
     record.need_quantities(limits.standard)
     if "Q0" not in record.result:
         raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
-    covered, track = record.covered(), record.result.track()
+    covered, track = record.covered_range(), record.result.track()
     if by_user is None:
         return track_sections(track, limits, service, covered, record.speed_at)
     file, sections = by_user[0], by_user[1].sections
@@ -251,7 +251,7 @@ def _sections(
 
 def _transitions(run: _Run, method: str, *, causal: bool) -> list[SectionValues]:
     record = run.record
-    parts = transitions(record.result.track(), record.covered(), record.speed_at)
+    parts = transitions(record.result.track(), record.covered_range(), record.speed_at)
     criteria = [c for c in CRITERIA.values() if method in c.methods and c.kind in DYNAMIC]
     criteria = [c for c in criteria if c.group in DYNAMIC]
     return section_values(record, parts, causal=causal, criteria=criteria)

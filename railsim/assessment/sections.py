@@ -241,5 +241,5 @@ def _outside(zone: Zone, radius: float, deficiency: float, speed: float, service
 def reasons(sections: Sequence[TestSection]) -> list[str]:
     """Sentences on sections outside the conditions of their zones, grouped by reason."""
     counts = Counter(section.reason for section in sections if section.reason)
-    words = "outside the conditions"
-    return [f"{n} section{'s' * (n > 1)} {words}: {reason}" for reason, n in counts.items()]
+    suffix = "outside the conditions"
+    return [f"{n} section{'s' * (n > 1)} {suffix}: {reason}" for reason, n in counts.items()]

@@ -65,7 +65,7 @@ class WearLawFile(FileDefinition):
     """Damage of the rail; alone, the laws of wear stay as without a file"""
 
     @check
-    def _one(self) -> None:
+    def _one_law(self) -> None:
         given = (self.archard is not None) + (self.krause_poll is not None)
         if given > 1 or not (given or self.whole_life_rail_model):
             raise ValueError("give one of the tables archard and krause_poll")

@@ -151,7 +151,7 @@ def _solve(problem: Problem, loss: str) -> Identified:
     bounds = np.array([p.bounds for p in problem.parameters]
                       + [(-np.inf, np.inf)] * (problem.size - problem.count)).T  # fmt: skip
     stated = problem.form.kind == "history"
-    known = stated and all(np.isfinite(p.noise).all() for p in problem.runs)
+    noise_known = stated and all(np.isfinite(p.noise).all() for p in problem.runs)
     _weigh(problem, x, stated=stated)
     x = _best_shares(problem, x)
     near = stated and all(len(p.run.at) * p.step > LONG * PART for p in problem.runs)
@@ -163,18 +163,18 @@ def _solve(problem: Problem, loss: str) -> Identified:
         problem.simulations = short.simulations
         x = np.concatenate([near_x[: problem.count], x[problem.count :]])
         _weigh(problem, x, stated=stated)
-    for tolerance in [FINE] if known else [*[COARSE][near:], *[FINE] * REWEIGHTED]:
+    for tolerance in [FINE] if noise_known else [*[COARSE][near:], *[FINE] * REWEIGHTED]:
         x, converged = _least_squares(problem, x, bounds, loss, tolerance)
         if not converged:
             remarks.append(f"The search has not settled after {MOST_STEPS} steps.")
-        if known or not _weigh(problem, x, stated=stated):
+        if noise_known or not _weigh(problem, x, stated=stated):
             break
     x, change = _with_own_derivatives(problem, x, bounds, loss)
     if change > CLOSE:
         remarks.append(f"The last step changed a parameter by {change:.2g} standard deviations.")
     remarks += _suspicions(problem, x, clocks=True)
-    remarks += [f"{p.run.name}: {words}" for p in problem.runs
-                for words in p.measurement.remarks]  # fmt: skip
+    remarks += [f"{p.run.name}: {remark}" for p in problem.runs
+                for remark in p.measurement.remarks]  # fmt: skip
     return _outcome(problem, start, x, loss, list(dict.fromkeys(remarks)))
 
 

@@ -155,10 +155,10 @@ class Identified:
                 continue
             row = row * np.sign(row[np.argmax(np.abs(row))])
             parts = [k for k in np.argsort(-np.abs(row)) if abs(row[k]) > PART * abs(row).max()]
-            known = "infinite" if spread > INFINITE else f"{100 * spread:.0f} %"
+            size = "infinite" if spread > INFINITE else f"{100 * spread:.0f} %"
             names = [self.parameters[k].name for k in parts]
             if len(parts) == 1:
-                texts.append(f"The data say nothing about {names[0]} (standard deviation {known}).")
+                texts.append(f"The data say nothing about {names[0]} (standard deviation {size}).")
                 continue
             changes = ", ".join(
                 f"{self.parameters[k].name} by {10 * row[k] / row[parts[0]]:+.1f} %" for k in parts
@@ -166,7 +166,7 @@ class Identified:
             texts.append(
                 f"The data cannot tell apart {', '.join(names[:-1])} and {names[-1]}: a change of "
                 f"{changes} at once leaves the channels as they are (standard deviation of this "
-                f"combination {known})."
+                f"combination {size})."
             )
         return tuple(texts)
 

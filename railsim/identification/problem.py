@@ -20,7 +20,7 @@ from railsim.arrays import Floats
 from railsim.files.access import read_bytes, whole_file
 from railsim.identification.parameters import Model, Parameter
 from railsim.identification.residuals import Form
-from railsim.identification.runs import Prepared
+from railsim.identification.runs import PreparedRun
 from railsim.processes import WorkerPool
 from railsim.profiles import load_profile
 from railsim.profiles.used import used_profiles
@@ -65,7 +65,7 @@ class Problem:
 
     model: Model
     parameters: Sequence[Parameter]
-    runs: Sequence[Prepared]
+    runs: Sequence[PreparedRun]
     form: Form
     place: bool  # whether shift and stretch of each run are sought
     workers: Workers
@@ -118,7 +118,7 @@ class Problem:
         """Number of coordinates."""
         return self.count + (2 * len(self.runs) if self.place else 0)
 
-    def placed(self, x: Floats) -> list[Prepared]:
+    def placed(self, x: Floats) -> list[PreparedRun]:
         """Return the runs at their places on the track."""
         if not self.place:
             return list(self.runs)
@@ -251,7 +251,7 @@ class Problem:
         return columns
 
     def _difference(
-        self, placed: list[Prepared], base: list[Floats], moved: list[Floats], step: float
+        self, placed: list[PreparedRun], base: list[Floats], moved: list[Floats], step: float
     ) -> Floats:
         """Derivative of the residuals by a difference of series; zero of what was known before."""
         rows = []
@@ -263,7 +263,7 @@ class Problem:
     def _simulate(self, requests: Sequence[tuple[Floats, int, bool]]) -> list[Floats]:
         """Return series of (coordinates, number of the run, slope or not)."""
         series = [self._stored(*request) for request in requests]
-        missing = [number for number, kept in enumerate(series) if kept is None]
+        missing = [number for number, x in enumerate(series) if x is None]
         tasks: list[Task] = []
         for x, k, slope in (requests[number] for number in missing):
             run = self.placed(x)[k].run

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from railsim.arrays import Flags, Floats
-from railsim.identification.runs import FEWEST, Prepared
+from railsim.identification.runs import FEWEST, PreparedRun
 
 FORMS = ("history", "spectra", "sections")
 FADE = 1.0  # s
@@ -33,7 +33,7 @@ class Form:
     band: tuple[float, float]  # [Hz]
 
     def features(
-        self, prepared: Prepared, values: Floats, *, measured: bool = False
+        self, prepared: PreparedRun, values: Floats, *, measured: bool = False
     ) -> list[Floats]:
         """Return what is compared of each channel; `values` is float64[channel, time].
 
@@ -67,7 +67,7 @@ class Form:
             rows.append(0.5 * np.log(np.maximum(means, 1e-300)))
         return rows
 
-    def _sections(self, prepared: Prepared, x: Floats, valid: Flags) -> list[Floats]:
+    def _sections(self, prepared: PreparedRun, x: Floats, valid: Flags) -> list[Floats]:
         s = prepared.run.at
         number = ((s - s[0]) / SECTION).astype(int)
         rows = []
@@ -78,14 +78,14 @@ class Form:
             rows.append(np.concatenate([mean, np.sqrt(np.maximum(square - mean**2, 0.0))]))
         return rows
 
-    def expected(self, prepared: Prepared) -> Floats:
+    def expected(self, prepared: PreparedRun) -> Floats:
         """Return standard deviations of each channel's features by the noise stated, or NaN."""
         if self.kind != "history":
             return np.full(len(prepared.noise), np.nan)
         return prepared.noise * _density(prepared, self.band)
 
 
-def _density(prepared: Prepared, band: tuple[float, float]) -> float:
+def _density(prepared: PreparedRun, band: tuple[float, float]) -> float:
     """Standard deviation of white noise over all frequencies for 1 in the band [1]."""
     return float(np.sqrt(0.5 / prepared.step / (band[1] - band[0])))
 

@@ -25,7 +25,7 @@ from railsim.measurement import Measurement
 from railsim.measurement.counterpart import (
     amplified,
     check_channels,
-    compared,
+    counterparts,
     outputs_for,
     rests,
     series,
@@ -136,7 +136,7 @@ class Run:
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedRun:
     """A run, and what was measured at the same places."""
 
     run: Run
@@ -147,7 +147,7 @@ class Prepared:
     step: float  # time between two values [s]
     measurement: Measurement
 
-    def moved(self, shift: float, stretch: float) -> "Prepared":
+    def moved(self, shift: float, stretch: float) -> "PreparedRun":
         """Return the run with its place on the track changed."""
         s = self.run.at
         return replace(self, run=replace(self.run, at=s + shift + stretch * (s - s[0])))
@@ -180,7 +180,7 @@ def track_of(measurement: Measurement) -> Track:
 
 def prepare_run(
     measurement: Measurement, model: Model, band: tuple[float, float], track: Track | None = None
-) -> Prepared:
+) -> PreparedRun:
     """Return a measured run ready for comparison in a band of frequencies [Hz].
 
     A constant channel is left out with a remark: its deviation from the simulated one would count.
@@ -214,11 +214,11 @@ def prepare_run(
         found = f"{band[0]:g} to {high:g} Hz: {number} frequencies, {f[1]:.3g} Hz apart"
         allowed = f"{FEWEST} at least: a wider band or a longer run"
         raise input_error(measurement.name, found, allowed, key="band")
-    outputs = outputs_for(compared(measurement).values())
+    outputs = outputs_for(counterparts(measurement).values())
     constant = _constant_channels(thinner)
     dead = "does not change where runs are compared: a dead sensor? It is left out."
     measurement = measurement.with_remarks(*(f"{name} {dead}" for name in constant))
-    names = tuple(name for name in compared(measurement) if name not in constant)
+    names = tuple(name for name in counterparts(measurement) if name not in constant)
     channels = tuple(measurement.definition.channels[name] for name in names)
     settings_values: dict[str, Any] = {"output_rate": OVERSAMPLED * high, "outputs": outputs}
     if steady:
@@ -238,12 +238,12 @@ def prepare_run(
     values = np.stack([thinner[name] for name in names])
     share = np.sqrt(2.0 * (high - band[0]) / measurement.rate)
     noise = np.array([np.nan if c.noise is None else c.noise * share for c in channels])
-    return Prepared(run, values, names, noise, step, measurement)
+    return PreparedRun(run, values, names, noise, step, measurement)
 
 
 def _constant_channels(measurement: Measurement) -> list[str]:
     """Return the channels without a change; raises InputError: there is no other channel."""
-    channels = {name: measurement[name] for name in compared(measurement)}
+    channels = {name: measurement[name] for name in counterparts(measurement)}
     constant = [name for name, x in channels.items() if rests(x)]
     if len(constant) == len(channels):
         found = "no value where runs are compared"

@@ -36,9 +36,9 @@ _LOG = logging.getLogger(__name__)
 class Takes:
     """What a law is given and gives."""
 
-    words: str  # what it is: ``a force element``
-    given: tuple[str, ...]  # arguments that the loop gives, in the order of the block
-    named: tuple[str, ...] = ()  # further ones that have to be there: the inputs of a controller
+    kind: str  # what it is: ``a force element``
+    supplied: tuple[str, ...]  # arguments that the loop gives, in the order of the block
+    required: tuple[str, ...] = ()  # further ones that have to be there: the inputs of a controller
     gives: tuple[int, ...] = (1,)  # how many numbers it may return
     states: bool = False  # whether arguments ``state_1``, ... are states whose rates it returns
 
@@ -62,7 +62,7 @@ class Bound:
     states: int  # their number
     further: tuple[str, ...]  # names of its parameters, in the order of the block
     defaults: Mapping[str, float]  # of parameters that need not be given
-    kept: tuple[Any, ...]  # what has to live as long as the address is called
+    references: tuple[Any, ...]  # what has to live as long as the address is called
 
     def values(self, inputs: Floats, parameters: Sequence[float]) -> Any:
         """What a law of one value gives, called beside the loop.
@@ -134,9 +134,9 @@ class _Binding:
         arguments = inspect.signature(function).parameters
         names = self.names = list(arguments)
         states = [n for n in names if self.takes.states and n.startswith("state")]
-        special = {*states, *self.takes.given, *self.takes.named, MEMORY}
+        special = {*states, *self.takes.supplied, *self.takes.required, MEMORY}
         further = [n for n in names if n not in special]
-        missing = [n for n in self.takes.named if n not in names]
+        missing = [n for n in self.takes.required if n not in names]
         if missing:
             self._refuse(f"has no argument '{missing[0]}'", f"arguments: {', '.join(names)}")
         if (MEMORY in names) != (self.memory > 0):
@@ -150,12 +150,12 @@ class _Binding:
         self.allowed = (1 + len(states),) if states else self.takes.gives
         if self.gives is not None:  # one value may be for all
             self.allowed = (self.gives,) if self.gives == 1 else (1, self.gives)
-        required = [n for n in self.takes.named if n not in self.takes.given]
-        order = [*self.takes.given, *required, *states, *further, MEMORY]
+        required = [n for n in self.takes.required if n not in self.takes.supplied]
+        order = [*self.takes.supplied, *required, *states, *further, MEMORY]
         self.place = {n: self.allowed[-1] + k for k, n in enumerate(order)}
         compiles = self.law.compiled and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
-        address, kept = self._compiled(function) if compiles else self._plain(function)
-        return Bound(self.name, address, len(states), tuple(further), defaults, kept)
+        address, references = self._compiled(function) if compiles else self._plain(function)
+        return Bound(self.name, address, len(states), tuple(further), defaults, references)
 
     def _refuse(self, found: str, allowed: str, line: int | None = None) -> None:
         place = f"line {line}" if line else self.name
@@ -185,8 +185,8 @@ class _Binding:
             functions = [n for n, f in space.items() if isinstance(f, FunctionType)]
             self._refuse(f"is no function '{name}' of this file", _allowed_text(functions))
         mark = getattr(function, KIND, None)
-        if mark is not None and mark.replace("_", " ") not in self.takes.words:
-            self._refuse(f"is marked as {mark}", f"{self.takes.words} is needed here")
+        if mark is not None and mark.replace("_", " ") not in self.takes.kind:
+            self._refuse(f"is marked as {mark}", f"{self.takes.kind} is needed here")
         return function
 
     def _check_raises(self, tree: ast.Module, name: str) -> None:
@@ -226,7 +226,7 @@ class _Binding:
             number = len(members)
             if number not in self.allowed:
                 counts = " or ".join(map(str, self.allowed))
-                self._refuse(f"returns {number} values", f"{counts} as {self.takes.words}")
+                self._refuse(f"returns {number} values", f"{counts} as {self.takes.kind}")
             scope: dict[str, Any] = {"law": compiled, "carray": numba.carray, "nan": math.nan}
             exec(self._entry_text(number), scope)
             takes_block = types.void(types.CPointer(types.float64))

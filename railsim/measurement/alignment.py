@@ -54,11 +54,11 @@ def common_shift(signals: Iterable[tuple[Floats, Floats, Floats, Floats]]) -> Sh
     others do not share it.
     """
     shifts = [shift_of(*signal) for signal in signals]
-    agreeing = [one for one in shifts if one is not None and one.share >= AGREEING]
-    best = max((one.correlation for one in agreeing), default=0.0)
+    agreeing = [a for a in shifts if a is not None and a.share >= AGREEING]
+    best = max((a.correlation for a in agreeing), default=0.0)
     alike = sorted((s for s in agreeing if s.correlation >= best - AS_ALIKE), key=lambda s: s.shift)
     middle = alike[len(alike) // 2] if alike else None
-    near = [one for one in agreeing if middle is not None and abs(one.shift - middle.shift) < NEAR]
+    near = [a for a in agreeing if middle is not None and abs(a.shift - middle.shift) < NEAR]
     return middle if len(near) >= TOGETHER * len(shifts) else None
 
 

@@ -20,7 +20,7 @@ READINGS = ("sensor_acceleration", "sensor_roll_rate")
 RESTS = 1e-9  # change over the largest value up to which a channel rests
 
 
-def compared(measurement: Measurement) -> dict[str, str]:
+def counterparts(measurement: Measurement) -> dict[str, str]:
     """Return the channels that a vehicle has a counterpart of: their quantities by names."""
     return {n: q for n, q in measurement.quantities.items() if q not in AXES}
 
@@ -49,7 +49,7 @@ def check_channels(file: str, measurement: Measurement, vehicle: Vehicle) -> Non
         "element": [element.name for element in flat.elements],
     }
     faults = Faults()
-    for name, selection in compared(measurement).items():
+    for name, selection in counterparts(measurement).items():
         base, *labels = selection.split(":")
         quantity = QUANTITIES.get(base) or REQUESTED[base]
         for dim, label in zip(quantity.dims[1:], labels, strict=True):

@@ -220,12 +220,12 @@ def _measurement(
         track = load_track(setup.track)
         mileage = track.mileage, track.falling_mileage
     s, speed, position_remarks = position(path, setup, clock.time, axes, mileage)
-    values = _mounted(path, setup, values, remarks)
+    values = _without_mounting(path, setup, values, remarks)
     values = {name: _zeroed(path, name, setup, x, clock.time) for name, x in values.items()}
     return Measurement(setup, clock.time, s, speed, values, (*remarks, *position_remarks))
 
 
-def _mounted(
+def _without_mounting(
     path: str, setup: MeasurementFile, values: dict[str, Floats], remarks: list[str]
 ) -> dict[str, Floats]:
     """Return the channels with the accelerations at points of `mounting` turned back.

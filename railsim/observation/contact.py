@@ -132,8 +132,8 @@ def with_mean_contact(
             power[number] += np.abs(own_part) ** 2
             common[number] += own_part * np.conj(shift[:, w, 0])
     count = len(tangent.offsets)
-    each, together = (_smoothed(k, p / count) for p in (power, np.abs(common) ** 2))
-    noise = Noise(k, np.maximum(each, together).T, float(np.mean(amplitudes)))
+    alone, together = (_smoothed(k, p / count) for p in (power, np.abs(common) ** 2))
+    noise = Noise(k, np.maximum(alone, together).T, float(np.mean(amplitudes)))
     return replace(tangent, A=A, B=B), noise
 
 

@@ -50,8 +50,8 @@ class Fields:
         """Cov[r | y] of (1) per bin, complex128[bin, field, field]."""
         N = 1.0 / self.errors
         seen = np.einsum("kcp,kc,kcq->kpq", self.response.conj(), N, self.response, optimize=True)
-        one, P = np.eye(self.power.shape[1]), self.power[:, :, None]
-        return np.asarray(np.linalg.solve(one + P * seen, P * one))
+        eye, P = np.eye(self.power.shape[1]), self.power[:, :, None]
+        return np.asarray(np.linalg.solve(eye + P * seen, P * eye))
 
     def gain(self, fields: int) -> Complexes:
         """P H* G^-1 of (1) for the first fields, complex128[bin, field, channel]."""

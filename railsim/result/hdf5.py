@@ -119,7 +119,7 @@ class Hdf5Sink(sinks.Sink):
         names = sinks.full_coordinates(coordinates)
         for dim, labels in names.items():
             _write_names(self._contents, dim, labels)
-        for name in sinks.timed(self._quantities):
+        for name in sinks.time_quantities(self._quantities):
             inner = tuple(len(names[dim]) for dim in self._quantities[name].dims[1:])
             self._blocks[name] = np.empty((ROWS_AT_ONCE, *inner))
 
@@ -236,7 +236,7 @@ def write(
     selected = {name: q for name, q in result.quantities.items() if name in chosen}
     with Hdf5Sink(path, overwrite=overwrite, option=str(path), storage=storage) as sink:
         sink.begin(result.coordinates, selected.values())
-        sink.append({name: result[name] for name in sinks.timed(selected)})
+        sink.append({name: result[name] for name in sinks.time_quantities(selected)})
         statics = {name: result[name] for name in selected if "time" not in selected[name].dims}
         sink.close(result.attributes, statics, result.profiles, result.groups)
     return sink.path

@@ -34,8 +34,8 @@ def all_labels(
     dims: Sequence[str], coordinates: Mapping[str, Sequence[str]]
 ) -> dict[str, tuple[str, str]]:
     """Return dimension and name of all texts that name a place along some dimensions."""
-    each = ((dim, coordinates[dim], known_labels(dim, coordinates[dim])) for dim in dims)
-    return {label: (dim, names[k]) for dim, names, index in each for label, k in index.items()}
+    rows = ((dim, coordinates[dim], known_labels(dim, coordinates[dim])) for dim in dims)
+    return {label: (dim, names[k]) for dim, names, index in rows for label, k in index.items()}
 
 
 def chosen_names(

@@ -273,14 +273,14 @@ class _Reader:
         if version in OLDER:
             remarks = [*str(facts.get("remarks", "")).splitlines(), OLDER[version]]
             facts["remarks"] = "\n".join(dict.fromkeys(remarks))
-        datasets = {name: each for name, each in members.items() if name not in groups}
+        datasets = {name: d for name, d in members.items() if name not in groups}
         coordinates, quantities = self._inventory(datasets)
         stored_profiles = inner.pop("profiles", {}).items()
-        profiles = {unquote(k): self._profile(f"profiles/{k}", one) for k, one in stored_profiles}
+        profiles = {unquote(k): self._profile(f"profiles/{k}", p) for k, p in stored_profiles}
         arrays: dict[str, dict[str, Floats]] = {}
         for group, some in inner.items():
-            numbers = {key: each for key, each in some.items() if not each.is_text}
-            arrays[group] = {k: self._floats(f"{group}/{k}", each) for k, each in numbers.items()}
+            numbers = {key: d for key, d in some.items() if not d.is_text}
+            arrays[group] = {k: self._floats(f"{group}/{k}", d) for k, d in numbers.items()}
         self._check_peaks(arrays.get("peaks", {}), quantities, coordinates)
         shapes = {name: datasets[name].shape for name in quantities}
         stored = StoredArrays(self._path, shapes, self._stamp)

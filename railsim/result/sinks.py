@@ -118,7 +118,7 @@ class MemorySink(Sink):
         """See `Sink.begin`."""
         self._quantities = {q.name: q for q in quantities if matches(q.name, self._only)}
         self._coordinates = full_coordinates(coordinates)
-        for name in timed(self._quantities):
+        for name in time_quantities(self._quantities):
             shape = (len(self._coordinates[dim]) for dim in self._quantities[name].dims[1:])
             self._chunks[name] = [np.zeros((0, *shape))]
 
@@ -157,7 +157,7 @@ def matches(name: str, patterns: Iterable[str]) -> bool:
     return any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
-def timed(quantities: Mapping[str, Quantity]) -> tuple[str, ...]:
+def time_quantities(quantities: Mapping[str, Quantity]) -> tuple[str, ...]:
     """Return the names of the quantities that are functions of time."""
     return tuple(name for name, quantity in quantities.items() if "time" in quantity.dims)
 

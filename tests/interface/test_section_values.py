@@ -218,7 +218,7 @@ def test_a_record_covers_what_the_whole_vehicle_passed_after_the_start(speed, be
     The last instant, which may lie between two outputs, does not count.
     """
     record = Record(made(track({"type": "STR", "length": 200.0}), speed, **FINE), "run")
-    assert record.covered() == pytest.approx((begin, 200.0 - speed / RATE - 10.78))
+    assert record.covered_range() == pytest.approx((begin, 200.0 - speed / RATE - 10.78))
 
 
 def test_signals_of_a_part_need_no_search_for_garbage():

@@ -19,7 +19,7 @@ from railsim.measurement.counterpart import amplified, check_channels, outputs_f
 from railsim.measurement.data import Measurement
 from railsim.measurement.likeness import Likeness, likeness
 from railsim.measurement.position import position
-from railsim.measurement.reading import _clipped, _implausible, _mounted
+from railsim.measurement.reading import _clipped, _implausible, _without_mounting
 
 
 def signal(s, shortest=4.0, seed=1, count=40):
@@ -427,7 +427,7 @@ def test_turned_sensors_are_turned_back_as_the_rotation_says(angles, measured):
     values = {f"channel {axis}": read[:, "xyz".index(axis)] for axis in measured}
     how = SimpleNamespace(channels=channels, mounting={"p": tuple(small)})
     remarks = []
-    found = _mounted("made", how, values, remarks)
+    found = _without_mounting("made", how, values, remarks)
     for axis in measured:
         error = found[f"channel {axis}"] - true[:, "xyz".index(axis)]
         assert np.abs(error).max() < 1e-4 * np.abs(small).max() * 9.81 + 3e-10

@@ -20,7 +20,7 @@ from railsim.identification.identified import Channel
 from railsim.identification.parameters import Parameter
 from railsim.identification.problem import Problem, Workers
 from railsim.identification.residuals import Form, whiteness
-from railsim.identification.runs import Prepared
+from railsim.identification.runs import PreparedRun
 from railsim.plot import validation as plots
 from railsim.profiles import save_profile
 from railsim.profiles.used import exchanged_wheels
@@ -76,7 +76,7 @@ def runs(random, noise):
         values = values + noise * NOISE[:, None] * random.normal(size=(2, N))
         in_band = NOISE * np.sqrt((BAND[1] - BAND[0]) / (0.5 / STEP))
         measurement = SimpleNamespace(remarks=())
-        found.append(Prepared(run, values, ("one", "other"), in_band, STEP, measurement))
+        found.append(PreparedRun(run, values, ("one", "other"), in_band, STEP, measurement))
     return found
 
 

@@ -37,7 +37,7 @@ class Single(Irregular):
         """Return its type and arc length."""
         return f"{self.type} at {self.s:g} m"
 
-    def moved(self, *middle: float) -> Displacement:
+    def with_middle(self, *middle: float) -> Displacement:
         """Return the displacement that is `middle` at `s` (y, z left, y, z right) [m]."""
         shares = np.array(middle)[:, None]
         shape = self._cosine if self.shape == "cosine" else self._triangle
@@ -79,7 +79,7 @@ class Dip(Single):
     def displacement(self, length: float) -> Displacement:
         """Return how it moves the rails."""
         left, right = MOVED[self.rail]
-        return self.moved(0.0, self.depth * left, 0.0, self.depth * right)
+        return self.with_middle(0.0, self.depth * left, 0.0, self.depth * right)
 
 
 class Kink(Single):
@@ -98,7 +98,7 @@ class Kink(Single):
     def displacement(self, length: float) -> Displacement:
         """Return how it moves the rails."""
         left, right = MOVED[self.rail]
-        return self.moved(self.offset * left, 0.0, self.offset * right, 0.0)
+        return self.with_middle(self.offset * left, 0.0, self.offset * right, 0.0)
 
 
 class Twist(Single):
@@ -115,4 +115,4 @@ class Twist(Single):
     def displacement(self, length: float) -> Displacement:
         """Return how it moves the rails."""
         half = 0.5 * self.height
-        return self.moved(0.0, -half, 0.0, half)
+        return self.with_middle(0.0, -half, 0.0, half)

@@ -79,17 +79,17 @@ def bounds_of(mechanism: Mechanism) -> Iterator[tuple[str, float, float]]:
 
 def _parameter_faults(mechanism: Mechanism) -> Iterator[Fault]:
     parameters, derived, optimise = mechanism.parameters, mechanism.derived, mechanism.optimise
-    known = {**parameters, **derived}
+    names_known = {**parameters, **derived}
     used: set[str] = set()
     for name in sorted(parameters.keys() & derived.keys()):
         yield _fault(f"derived.{name}", "is a parameter too", "another name")
     for key, expression in members(Expression, mechanism):
-        for name in sorted(expression.names - known.keys()):
-            hint = nearest(name, known) if known else "there are no parameters"
+        for name in sorted(expression.names - names_known.keys()):
+            hint = nearest(name, names_known) if names_known else "there are no parameters"
             yield _fault(key, f"no parameter '{name}' in '{expression}'", hint)
         if not key.startswith("cases."):
             used |= expression.names
-    for name in known:
+    for name in names_known:
         if name not in used:
             home = "parameters" if name in parameters else "derived"
             yield _fault(f"{home}.{name}", "is used nowhere", "use it or take it out")

@@ -205,8 +205,8 @@ def _not_reached(sections: Sequence[Section], rounding: float) -> Iterator[Remar
 
 def _mileages(track: "Track") -> Iterator[Remark]:
     """Remark on recordings that are put where the mileage of the track is another one."""
-    known = track.mileage or track.falling_mileage
-    for k, part in enumerate(track.irregularities if known else ()):
+    has_mileage = track.mileage or track.falling_mileage
+    for k, part in enumerate(track.irregularities if has_mileage else ()):
         if not isinstance(part, Measured):
             continue
         begin, own = part.extent(track.length)[0], part.mileage

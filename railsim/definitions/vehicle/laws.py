@@ -173,7 +173,7 @@ def with_sources(tables: dict[str, Any]) -> list[Fault]:
     """
     faults: list[Fault] = []
     laws = tables.setdefault("laws", {})
-    for key, name in _used(tables) if isinstance(laws, dict) else ():
+    for key, name in _used_laws(tables) if isinstance(laws, dict) else ():
         if name not in laws:
             if name in library_files("law"):
                 laws[name] = {"file": name}
@@ -203,10 +203,10 @@ def with_sources(tables: dict[str, Any]) -> list[Fault]:
     return faults
 
 
-def _used(node: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
+def _used_laws(node: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
     """Yield key and name of every law that is used in plain tables."""
     for key, value in node.items() if isinstance(node, dict) else enumerate(node):
         if key == "law" and isinstance(value, str):
             yield f"{prefix}law", value
         elif isinstance(value, dict | list) and f"{prefix}{key}" != "laws":
-            yield from _used(value, f"{prefix}{key}.")
+            yield from _used_laws(value, f"{prefix}{key}.")

@@ -75,7 +75,7 @@ def load_faults(vehicle: Any) -> list[Fault]:
     """Return what load cases name that is not there; the faults' file is left empty."""
     faults: list[Fault] = []
     for name, load in vehicle.loads.items():
-        faults += _unknown(vehicle, load, f"loads.{name}")
+        faults += _unknown_names(vehicle, load, f"loads.{name}")
     if DESIGN in vehicle.loads:
         found = "the load of the vehicle's own numbers is called so"
         faults.append(Fault("", f"loads.{DESIGN}", found, "another name"))
@@ -85,7 +85,7 @@ def load_faults(vehicle: Any) -> list[Fault]:
     return faults
 
 
-def _unknown(group: Any, load: LoadGroup, key: str) -> Iterator[Fault]:
+def _unknown_names(group: Any, load: LoadGroup, key: str) -> Iterator[Fault]:
     for table, word in (("bodies", "body"), ("assemblies", "assembly")):
         names = list(getattr(group, table))
         for name in getattr(load, table):
@@ -94,4 +94,4 @@ def _unknown(group: Any, load: LoadGroup, key: str) -> Iterator[Fault]:
                 yield Fault("", f"{key}.{table}.{name}", found, nearest(name, names))
     for name, inner in load.assemblies.items():
         if name in group.assemblies:
-            yield from _unknown(group.assemblies[name], inner, f"{key}.assemblies.{name}")
+            yield from _unknown_names(group.assemblies[name], inner, f"{key}.assemblies.{name}")
