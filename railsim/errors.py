@@ -142,10 +142,10 @@ class InputError(RailsimError):
     """The input is wrong; `faults` lists what was found, the first hundred and a count."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
-        found = list(faults)
-        if (more := len(found) - MOST_FAULTS) > 1:
-            found[MOST_FAULTS:] = [Fault(found[-1].file, "", f"{more} more faults", "")]
-        self.faults = tuple(found)
+        faults = list(faults)
+        if (more := len(faults) - MOST_FAULTS) > 1:
+            faults[MOST_FAULTS:] = [Fault(faults[-1].file, "", f"{more} more faults", "")]
+        self.faults = tuple(faults)
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
     def __reduce__(self) -> tuple[type, tuple[tuple[Fault, ...]]]:

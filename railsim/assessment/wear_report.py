@@ -70,11 +70,11 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
         record.need((*needed, "patch_friction"), "settings.outputs.contact_patches=true")
     patches = all(name in record.result for name in needed)
     worn = {n: np.zeros(shape) for n in laws if patches or laws[n] is wear.LAWS[wear.DEFAULT_LAW]}
-    way = np.gradient(record.distance)
+    distances = np.gradient(record.distance)
     for rows, counted in record.pieces(0.0):
         rows = slice(rows.start + counted.start, rows.start + counted.stop)
         T_gamma = record.part("T_gamma", rows)
-        ways = way[rows, None, None]
+        ways = distances[rows, None, None]
         mean += np.sum(T_gamma * ways, axis=0)
         length += float(np.sum(ways))
         for (w, k), stream in streams.items():
@@ -91,7 +91,7 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
             worst = np.where(fatigue[0] > worst[0], fatigue, worst)
         passes = model.patch_damage(each, along) * ways[..., None]
         damage = damage + np.sum(passes, axis=0)
-        speed = (way / np.gradient(record.time))[rows, None, None, None]
+        speed = (distances / np.gradient(record.time))[rows, None, None, None]
         contacts = wear.Patches(each, area, 2.0 * radii[..., None], load, mu, speed)
         for name in worn:
             lost = laws[name].worn_area(contacts)

@@ -105,7 +105,7 @@ def parse_keys(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track)
     """
     chosen: list[Parameter] = []
     faults = Faults()
-    taken: list[tuple[str, ...]] = []
+    places_taken: list[tuple[str, ...]] = []
     for text in texts:
         try:
             p = _parse(text) if isinstance(text, str) else text
@@ -125,9 +125,9 @@ def parse_keys(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track)
                     raise ValueError(found, "a number that is not 0")
                 places.append((kind, *path))
             for place in places:
-                if any(place[: len(other)] == other[: len(place)] for other in taken):
+                if any(place[: len(other)] == other[: len(place)] for other in places_taken):
                     raise ValueError(f"{place[-1]} is given twice", "each value once")
-                taken.append(place)
+                places_taken.append(place)
             chosen.append(p)
         except (KeyError, ValueError) as error:
             label = text if isinstance(text, str) else text.name

@@ -78,20 +78,20 @@ def clock_of(file: str, times: Floats) -> Clock:
         found = f"a gap of {steps.max():g} s"
         raise input_error(file, found, "a record in one piece, or two files", key="time")
     places, begin = np.zeros(len(times), dtype=np.int64), 0
-    off = 0.0
+    deviation = 0.0
     for end in [*ends.tolist(), len(times) - 1]:
         piece = times[begin : end + 1]
         count = np.arange(len(piece))
         offset = float(np.mean(piece - count * step))
         first = round((offset - times[0]) / step)
         places[begin : end + 1] = first + count
-        off = max(off, float(np.abs(piece - times[0] - (first + count) * step).max()))
+        deviation = max(deviation, float(np.abs(piece - times[0] - (first + count) * step).max()))
         begin = end + 1
     rising = bool((np.diff(places) > 0).all())
     remarks = []
     if len(ends):
         remarks.append(f"The record has {len(ends)} gaps, together {steps[ends].sum():.3g} s.")
-    if rising and off < (ROUNDED + 0.5 * bool(len(ends))) * step:
+    if rising and deviation < (ROUNDED + 0.5 * bool(len(ends))) * step:
         time = times[0] + step * np.arange(places[-1] - places[0] + 1)
         return Clock(time, 1.0 / step, places - places[0], times, tuple(remarks))
     remarks.append(

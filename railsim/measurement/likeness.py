@@ -76,9 +76,9 @@ def _drift(a: Floats, b: Floats, step: float) -> float:
         return np.nan
     lags = np.array([lag for _, lag in lags_found])
     slope, middle = np.polyfit(np.arange(PARTS), lags, 1)
-    off = float(np.max(np.abs(lags - middle - slope * np.arange(PARTS))))
+    deviation = float(np.max(np.abs(lags - middle - slope * np.arange(PARTS))))
     drift = float(slope * PARTS)
-    return drift if off < max(step, 0.2 * abs(drift)) else np.nan
+    return drift if deviation < max(step, 0.2 * abs(drift)) else np.nan
 
 
 def _best(a: Floats, b: Floats, step: float) -> tuple[float, float]:

@@ -90,9 +90,9 @@ def _without_gaps(file: str, name: str, time: Floats, x: Floats, remarks: list[s
 def _rising(file: str, time: Floats, counter: Floats, remarks: list[str]) -> Floats:
     s = _without_gaps(file, "distance", time, counter, remarks)
     highest = np.maximum.accumulate(s)
-    back = float(np.max(highest - s))
-    if back > BACKWARDS or s[-1] <= s[0]:
-        found = f"falls by {back:.3g} m" if s[-1] > s[0] else "does not rise"
+    fall = float(np.max(highest - s))
+    if fall > BACKWARDS or s[-1] <= s[0]:
+        found = f"falls by {fall:.3g} m" if s[-1] > s[0] else "does not rise"
         allowed = "a distance that rises; a mileage may fall (quantity = 'mileage')"
         raise input_error(file, found, allowed, key="distance")
     moving = np.concatenate([[True], np.diff(highest) > 0.0])

@@ -124,15 +124,15 @@ def likely_sizes(powers: Powers, spectra: Complexes) -> Sizes:
         expected = np.sum(signal * np.einsum("kcc->kc", inverse).real, axis=0)
         model = sizes.model * (observed / expected) ** 0.25
         seen = np.sum(part.unknown * np.abs(np.einsum("kcj,kc->kj", d.conj(), z)) ** 2, axis=0)
-        meant = np.einsum("kj,kcj,kcd,kdj->j", part.unknown, d.conj(), inverse, d, optimize=True)
+        likely = np.einsum("kj,kcj,kcd,kdj->j", part.unknown, d.conj(), inverse, d, optimize=True)
         contact = sizes.contact.copy()
         for j, kind in enumerate(KINDS):
             rows = np.isin(np.arange(len(seen)) % sum(map(len, KINDS)), kind)
-            contact[j] *= np.sqrt(seen[rows].sum() / meant.real[rows].sum())
+            contact[j] *= np.sqrt(seen[rows].sum() / likely.real[rows].sum())
         sizes = Sizes(np.maximum(contact, FINEST), np.maximum(model, FINEST))
-    whole = np.full(len(spectra), MODEL)
-    whole[used] = sizes.model
-    return Sizes(sizes.contact, whole)
+    model_sizes = np.full(len(spectra), MODEL)
+    model_sizes[used] = sizes.model
+    return Sizes(sizes.contact, model_sizes)
 
 
 def disagreeing_channels(

@@ -170,13 +170,13 @@ def _other_curves(track: Track, record: Measurement, used: dict[str, str]) -> It
         means = [[m for x in channels if np.isfinite(m := float(np.mean(x[row])))] for row in rows]
         read = np.array([np.median(np.array(values or [np.nan])) for values in means])
         off = read - np.array([np.mean(of_track[row]) for row in rows])
-        if len(far := np.flatnonzero(np.abs(off) > most)):
-            k = far[np.argmax(np.abs(off[far]))]
+        if len(beyond := np.flatnonzero(np.abs(off) > most)):
+            k = beyond[np.argmax(np.abs(off[beyond]))]
             place, has = f"s = {s[edges[k]]:.0f} to {s[edges[k + 1]]:.0f} m", read[k] - off[k] + 0.0
             yield (
                 f"The record is not of the curves and cants of track '{track.name}': at {place} it "
                 f"has a {text.format(read[k])} in the mean, the track one of {has:.2g}; they "
-                f"differ by more than {most:g} in {len(far)} of {len(rows)} such lengths."
+                f"differ by more than {most:g} in {len(beyond)} of {len(rows)} such lengths."
             )
 
 

@@ -119,7 +119,7 @@ def hunting(record: Result, rails: Rails | None = None) -> Hunting | None:
     if not any(np.any(cycles.regular()) for cycles in cycles_of):  # most runs
         return None
     force = band(on_grid("sum_Y"))
-    found: list[tuple[float, float, int, int]] = []  # amplitude, cycles per sample, begin, end
+    cycling: list[tuple[float, float, int, int]] = []  # amplitude, cycles per sample, begin, end
     for w, cycles in enumerate(cycles_of):
         swing = cycles.amplitudes(lateral[:, w])
         hunts = cycles.regular() & _regular(swing) & _regular(cycles.amplitudes(force[:, w]))
@@ -133,11 +133,11 @@ def hunting(record: Result, rails: Rails | None = None) -> Hunting | None:
             most = windows[np.argmax(_mean(swing)[windows])]
             begin, end = cycles.starts[windows[0]], cycles.starts[windows[-1] + CYCLES]
             largest = float(_mean(swing)[most]), 1.0 / float(_mean(cycles.lengths)[most])
-            found.append((*largest, int(begin), int(end)))
-    if not found:
+            cycling.append((*largest, int(begin), int(end)))
+    if not cycling:
         return None
-    amplitude, frequency, *_ = max(found)
-    begin, end = min(cycle[2] for cycle in found), max(cycle[3] for cycle in found)
+    amplitude, frequency, *_ = max(cycling)
+    begin, end = min(cycle[2] for cycle in cycling), max(cycle[3] for cycle in cycling)
     swings = np.std(lateral[begin:end], axis=0)
     way = on_grid("distance")[[begin, min(end, len(grid) - 1)], 0]
     hunt = tuple(np.flatnonzero(swings >= TOO * np.max(swings)).tolist())

@@ -256,8 +256,8 @@ class _Reader:
         members = dict(self._members(file, ""))
         groups = {name: group for name, group in members.items() if isinstance(group, h5py.Group)}
         inner = {name: dict(self._members(group, f"{name}/")) for name, group in groups.items()}
-        for name, some in inner.items():
-            for key, member in some.items():
+        for name, inner_members in inner.items():
+            for key, member in inner_members.items():
                 if not isinstance(member, _Dataset):
                     raise self.fault(f"{name}/{key}", "a group within a group")
         size = self._path.stat().st_size
@@ -278,8 +278,8 @@ class _Reader:
         stored_profiles = inner.pop("profiles", {}).items()
         profiles = {unquote(k): self._profile(f"profiles/{k}", p) for k, p in stored_profiles}
         arrays: dict[str, dict[str, Floats]] = {}
-        for group, some in inner.items():
-            numbers = {key: d for key, d in some.items() if not d.is_text}
+        for group, inner_members in inner.items():
+            numbers = {key: d for key, d in inner_members.items() if not d.is_text}
             arrays[group] = {k: self._floats(f"{group}/{k}", d) for k, d in numbers.items()}
         self._check_peaks(arrays.get("peaks", {}), quantities, coordinates)
         shapes = {name: datasets[name].shape for name in quantities}

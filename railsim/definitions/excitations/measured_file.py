@@ -45,11 +45,11 @@ def _embed(key: str, table: dict[str, Any]) -> None:
     if path.suffix.lower() != ".csv":
         found = f"'{path.name}' is no CSV"
         raise input_error("", found, "the name must end in .csv", key=f"{key}.file")
-    how = _definition(table)
-    if how is None:
+    part = _definition(table)
+    if part is None:
         return  # refused by the definition
     with changed_faults(lambda f: f if f.file else replace(f, key=f"{key}.{f.key}")):
-        rows, mileage = read_measured(path, how)
+        rows, mileage = read_measured(path, part)
     for name in ("file", *READING):
         table.pop(name, None)
     table["rows"] = rows.tolist()
@@ -73,30 +73,30 @@ def recordings(tables: Iterable[Any]) -> list[tuple[str, Floats, Floats]]:
     """
     recordings = []
     for table in tables:
-        how = _definition(table) if "file" in table else None
-        if how is None:
+        part = _definition(table) if "file" in table else None
+        if part is None:
             continue
-        plain = how.model_copy(update={"chord": None, "band": None})
+        plain = part.model_copy(update={"chord": None, "band": None})
         path = Path(table["file"])
-        before, after = (read_measured(path, definition)[0] for definition in (plain, how))
-        before[:, 0] += how.shift
-        after[:, 0] += how.shift
-        after[:, 1:] *= how.scale
+        before, after = (read_measured(path, definition)[0] for definition in (plain, part))
+        before[:, 0] += part.shift
+        after[:, 0] += part.shift
+        after[:, 1:] *= part.scale
         recordings.append((path.name, before, after))
     return recordings
 
 
-def read_measured(path: Path, how: Measured) -> tuple[Floats, float | None]:
+def read_measured(path: Path, part: Measured) -> tuple[Floats, float | None]:
     """Read rows [s, y_left, z_left, y_right, z_right] and a falling mileage of the first, in m.
 
     Raises InputError.
     """
     try:
-        text = read_bytes(path, TABLE_BYTES).decode(how.encoding or "utf-8-sig")
-        return _rows_of(path, text, how)
+        text = read_bytes(path, TABLE_BYTES).decode(part.encoding or "utf-8-sig")
+        return _rows_of(path, text, part)
     except LookupError:
         allowed = "a name such as utf-8, latin-1 or utf-16"
-        found, key = f"unknown encoding '{how.encoding}'", "encoding"
+        found, key = f"unknown encoding '{part.encoding}'", "encoding"
         raise input_error("", found, allowed, key) from None
     except UnicodeDecodeError as error:
         found = f"byte {error.start} is not {error.encoding}"
@@ -113,7 +113,7 @@ class Column(NamedTuple):
     offset: float = 0.0  # value of the undisplaced rails
 
 
-def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None]:
+def _rows_of(path: Path, text: str, part: Measured) -> tuple[Floats, float | None]:
     numbered = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
@@ -123,10 +123,10 @@ def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None
         raise input_error(path, "empty", "a header and rows of numbers")
     delimiter = next((d for d in (";", "\t") if d in numbered[0][1]), ",")
     head = [cell.strip() for cell in next(csv.reader([numbered[0][1]], delimiter=delimiter))]
-    columns = _named_columns(path, head, how.columns) if how.columns else _header(path, head)
-    columns = [column and _calibrated(column, how) for column in columns]
+    columns = _named_columns(path, head, part.columns) if part.columns else _header(path, head)
+    columns = [column and _calibrated(column, part) for column in columns]
     used = [column for column in columns if column]
-    _check_names(path, [column.name for column in used], how)
+    _check_names(path, [column.name for column in used], part)
     faults: list[tuple[int, str, str]] = []  # number of the line, found, allowed
     numbers, table = [], []
     for number, line in numbered[1:]:
@@ -139,21 +139,21 @@ def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None
         except ValueError as problem:
             faults.append((number, *problem.args))
     values = np.array(table).reshape(len(table), len(used))
-    rows, mileage = _rows(used, values, how)
+    rows, mileage = _rows(used, values, part)
     faults += [(numbers[k], what, allowed) for k, what, allowed in _row_faults(rows, used, values)]
     faults.sort(key=lambda fault: fault[0])
     Faults(merge_similar(Fault(str(path), f"line {n}", *words) for n, *words in faults)).check()
     if len(rows) < 4:
         raise input_error(path, f"{len(rows)} rows", "four rows at least")
-    return _filtered(path, rows, how), mileage
+    return _filtered(path, rows, part), mileage
 
 
-def _check_names(path: Path, read: Sequence[str], how: Measured) -> None:
+def _check_names(path: Path, read: Sequence[str], part: Measured) -> None:
     """Raise InputError where a file gives single rails and what is worked out from them.
 
     Or where a unit, an offset or a sign is given of a column that is not read.
     """
-    keys = {"units": how.units or (), "offset": how.offset or (), "reverse": how.reverse}
+    keys = {"units": part.units or (), "offset": part.offset or (), "reverse": part.reverse}
     faults = Faults(
         Fault("", key, f"'{name}' is no column that is read", nearest(name, read))
         for key, names in keys.items()
@@ -186,11 +186,11 @@ def _numbers(cells: Sequence[str], columns: Sequence[Column | None]) -> list[flo
     return values
 
 
-def _rows(columns: Sequence[Column], values: Floats, how: Measured) -> tuple[Floats, float | None]:
+def _rows(columns: Sequence[Column], values: Floats, part: Measured) -> tuple[Floats, float | None]:
     rows = np.zeros((len(values), 5))
     for (name, unit, offset), written in zip(columns, values.T, strict=True):
         rows += np.outer(written - offset, np.multiply(SHARES[name], unit))
-    if not how.falling_mileage or not len(rows):
+    if not part.falling_mileage or not len(rows):
         return rows, None
     mileage = float(rows[0, 0])
     rows[:, 0] = mileage - rows[:, 0]
@@ -223,30 +223,30 @@ def _row_faults(
         yield k, f"a displacement of {largest[k]:g} m", allowed
 
 
-def _filtered(path: Path, rows: Floats, how: Measured) -> Floats:
+def _filtered(path: Path, rows: Floats, part: Measured) -> Floats:
     """Rows with the chord's response inverted and within the band, as the definition asks."""
-    if not how.chord and not how.band:
+    if not part.chord and not part.band:
         return rows
     steps = np.diff(rows[:, 0])
     step = float(np.mean(steps))
     if np.max(np.abs(steps - step)) > 0.01 * step:
-        allowed = f"equal steps within 1 % (needed for '{'chord' if how.chord else 'band'}')"
+        allowed = f"equal steps within 1 % (needed for '{'chord' if part.chord else 'band'}')"
         raise input_error(path, "rows at unequal steps", allowed, "s")
     values = rows[:, 1:].T
-    if how.chord:
-        values = from_chord(values, step, how.chord)
-    if how.band:
-        band = BANDS[how.band] if isinstance(how.band, str) else how.band
+    if part.chord:
+        values = from_chord(values, step, part.chord)
+    if part.band:
+        band = BANDS[part.band] if isinstance(part.band, str) else part.band
         values = band_passed(values, step, band)
     return np.column_stack([rows[:, 0], values.T])
 
 
-def _calibrated(column: Column, how: Measured) -> Column:
+def _calibrated(column: Column, part: Measured) -> Column:
     """Return a column with the unit, sign and offset that the definition gives it."""
     name, unit, _ = column
-    if how.units and name in how.units:
-        unit = UNITS[f"_{how.units[name]}"]
-    return Column(name, -unit if name in how.reverse else unit, (how.offset or {}).get(name, 0.0))
+    if part.units and name in part.units:
+        unit = UNITS[f"_{part.units[name]}"]
+    return Column(name, -unit if name in part.reverse else unit, (part.offset or {}).get(name, 0.0))
 
 
 def _named_columns(path: Path, head: list[str], names: dict[str, str]) -> list[Column | None]:

@@ -275,8 +275,8 @@ def _least_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[F
 
 def _row_faults(key: str, row: CatalogueRow, values: Mapping[str, Any]) -> Iterator[Fault]:
     """Ranges and lists of a series of gas springs that cannot be."""
-    pair, some = "smallest and largest, greater than 0", "one or more, greater than 0"
-    for field, allowed in {"stroke": pair, "strokes": some, "F1": pair}.items():
+    pair, several = "smallest and largest, greater than 0", "one or more, greater than 0"
+    for field, allowed in {"stroke": pair, "strokes": several, "F1": pair}.items():
         if (quantities := getattr(row, field)) is not None:
             found = [number(q, values) for q in quantities]
             if not found or min(found) <= 0.0 or (allowed is pair and found != sorted(found)):

@@ -140,9 +140,9 @@ def track_remarks(track: "Track") -> Iterator[Remark]:
             span = f"from {begin:g} to {end:g} m" if begin <= end else f"from {begin:g} m on"
             text = f"{span}, beyond the track's {track.length:g} m"
             if shift is not None:
-                to = shift - begin if track.falling_mileage else -track.mileage or shift - begin
-                place = begin - shift + to
-                text += f"; is it a mileage? shift = {to:.9g} puts its begin at s = {place:g}"
+                needed = shift - begin if track.falling_mileage else -track.mileage or shift - begin
+                place = begin - shift + needed
+                text += f"; is it a mileage? shift = {needed:.9g} puts its begin at s = {place:g}"
             yield Remark(key, text)
         elif key.startswith("sections.") and (begin < 0.0 or end > track.length):
             text = f"from {begin:g} to {end:g} m, partly beyond the track's {track.length:g} m"
