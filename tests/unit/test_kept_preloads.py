@@ -28,7 +28,7 @@ def test_same_vehicle_takes_what_is_kept_to_the_last_bit(monkeypatch: pytest.Mon
     model = without_rails(railsim.load_vehicle("coach_manchester"))
     solved = with_preloads(model)
     again = without_rails(railsim.load_vehicle("coach_manchester"))
-    monkeypatch.delattr(preloads, "_solved")  # it must not be called
+    monkeypatch.delattr(preloads, "_solve_preloads")  # it must not be called
     assert _same(with_preloads(again), solved)
 
 

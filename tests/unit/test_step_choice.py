@@ -200,7 +200,7 @@ def test_steps_divide_the_output_interval_and_the_periods_of_controllers(
     system = SimpleNamespace(support=SimpleNamespace(elastic=True))
     steps._settings = Settings(output_rate=200.0, step=given)
     steps._model = SimpleNamespace(wheels=wheels, system=system)
-    steps._known, steps._periods = {20.0: given or 2e-3}, periods
+    steps._longest, steps._periods = {20.0: given or 2e-3}, periods
     steps._guided, steps._braked, steps._slipping = math.inf, braked, math.inf
     steps.varies, steps.smallest = False, math.inf
     steps._wave = math.inf
