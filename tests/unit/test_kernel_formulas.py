@@ -66,6 +66,7 @@ from railsim.kernels.contact_columns import (
     XI_Y,
 )
 from railsim.kernels.contact_table import G_ROLL, G_Y, LOOK_UP_SIZE
+from railsim.kernels.internal import PAD
 from railsim.kernels.rails import (
     ASIDE,
     COSINE,
@@ -79,7 +80,7 @@ from railsim.kernels.rails import (
     SINE,
     SLOPE_Z,
 )
-from railsim.kernels.state import ARC_LENGTH, velocity_begin
+from railsim.kernels.state import ARC_LENGTH, SPEED, velocity_begin
 from railsim.kernels.system import (
     COS_ROLL,
     FORCE,
@@ -137,6 +138,26 @@ def test_moment_of_a_bushing_is_the_gradient_of_its_potential(plain):
     spring = -approx_fprime(np.zeros(3), potential)
     assert moment == pytest.approx(spring + damping * rate, abs=1e-6)
     assert angle == pytest.approx(np.sin((R1.inv() * R2).magnitude()) * direction(R1.inv() * R2))
+
+
+@pytest.mark.parametrize("normal", [0.0, 3e3])
+def test_friction_of_a_pad_is_at_most_its_coefficients_times_its_load(normal, plain):
+    """Of one that slides in two directions sqrt(sum (f/limit)^2) <= 1; without load nothing."""
+    random, mu = np.random.default_rng(27), np.array([0.3, 0.2])
+    mounts = Record(curve=np.full((1, 3), -1), internal=np.array([[-1, 0, 1]]))
+    mounts.flags = np.zeros((1, elements.FRICTION + 1))
+    internal = Record(kind=[PAD, PAD], parameter=np.array([[1e6, 1.0, 0.0]] * 2))
+    work = Record(friction=np.zeros((1, 3, 2)), drive=np.zeros((2, 2)), laws=None)
+    work.friction[0, 1:, 1] = mu
+    plain(elements)
+    system, shares = Record(mounts=mounts, internal=internal, curves=None), []
+    for inner in random.normal(size=(20, 2)) * mu * 3e3:
+        force = [elements.axis_law(system, work, 0, k, (0.0, 1.0, normal), inner) for k in range(3)]
+        assert force[0] == 0.0
+        assert force[1] * inner[1] == pytest.approx(force[2] * inner[0])
+        shares.append(np.hypot(*(np.array(force[1:]) / (mu * 3e3))))
+    assert np.max(shares) == pytest.approx(normal / 3e3)
+    assert np.min(shares) < 0.9
 
 
 def direction(rotation):
@@ -276,6 +297,37 @@ def test_reference_of_a_free_run_keeps_its_place_in_the_frames():
         moved = X + np.cross(omega, place(system.bodies, b, state))
         assert change[b] == pytest.approx([*(-rate * moved), 0.0, 0.0, 0.0])
     assert derivative[6 * (n + 1)] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_traction_of_a_free_run_pulls_along_the_track_where_the_reference_body_is(plain):
+    """Less the running resistance, a polynomial of the speed; nothing on any other body."""
+    random, frames, pose = np.random.default_rng(25), np.zeros((2, FRAME_SIZE)), np.zeros((3, 30))
+    axes = [turn(a, 2) @ turn(0.1 * a, 1) @ turn(-a, 0) for a in random.normal(size=2)]
+    frames[:, ATTITUDE : ATTITUDE + 9] = np.reshape(axes, (2, 9))
+    drive = Record(table=np.array([[0.0, 900.0], [10.0, 500.0]]), resistance=[20.0, 3.0, 0.5])
+    bodies = Record(frame=[0, 0, 1], reference=2)
+    work, expected = Record(frames=frames, pose=pose), np.zeros((3, 30))
+    expected[2, FORCE : FORCE + 3] = (900.0 - 160.0 - (20.0 + 12.0 + 8.0)) * axes[1][:, 0]
+    plain(driving)
+    driving.add_traction(Record(drive=drive, bodies=bodies), work, 4.0)
+    np.testing.assert_allclose(pose, expected, atol=1e-12)
+
+
+def test_bodies_fixed_to_the_track_turn_with_their_own_frames(plain):
+    """In their own axes V C^T omega; two of four bodies, and nothing else of the state."""
+    random, n, speed, bodies = np.random.default_rng(26), 4, 3.0, Record(fixed=np.array([1, 3]))
+    bodies.kind, bodies.frame = np.zeros(n), [2, 1, 0, 0]
+    frames, state = random.normal(size=(3, FRAME_SIZE)), random.normal(size=60)
+    state[SPEED] = speed
+    expected = state.copy()
+    for b in bodies.fixed:
+        roll, pitch, yaw = state[6 * b + 3 : 6 * b + 6]
+        C, begin = turn(yaw, 2) @ turn(roll, 0) @ turn(pitch, 1), velocity_begin(n) + 6 * b
+        omega = frames[bodies.frame[b], OMEGA : OMEGA + 3]
+        expected[begin : begin + 6] = *np.zeros(3), *(speed * C.T @ omega)
+    plain(driving)
+    driving.turn_fixed(bodies, frames, state)
+    np.testing.assert_allclose(state, expected, atol=1e-12)
 
 
 def test_signals_of_the_track_ahead_are_the_slope_of_its_heading_and_its_cant(plain):
@@ -524,3 +576,5 @@ def test_sums_over_a_patch_are_integrals_of_its_overlap():
     np.testing.assert_allclose(found, sums, rtol=1e-6)
     np.testing.assert_allclose(weight, means, rtol=1e-5)
     assert deepest == pytest.approx(max((z - h) / lift) - theta)
+    assert weight[0] > 0.0
+    assert elastic_patch.weighted.py_func(weight, 2.0 + h) == pytest.approx(weight @ (2.0 + h))

@@ -1,5 +1,6 @@
 """Eight numbers side by side: each lane has what the same formula gives for one number."""
 
+import sys
 import tracemalloc
 
 import numba
@@ -134,6 +135,18 @@ def test_only_the_given_columns_are_added_to():
     total = np.zeros((2, 8))
     collect_three(table, where, total)
     np.testing.assert_array_equal(total, [[0.0] * 5 + list(table[:, :3].sum(axis=0)), [0.0] * 8])
+
+
+def test_rows_are_added_to_without_the_compiler_too(plain):
+    plain(sys.modules[__name__])
+    table, one, two = np.random.default_rng(5).normal(size=(21, 8)), *np.eye(3)[:2].astype(int)
+    one, two = (np.resize(row, 21) for row in (one, two))
+    total, expected = np.ones((2, 8)), np.ones((2, 8))
+    collect(table, one, two, total)
+    np.add.at(expected, one, table)
+    np.add.at(expected, two, 1.0 - table)
+    np.testing.assert_allclose(total, expected)
+    test_only_the_given_columns_are_added_to()
 
 
 @settings(deadline=None)  # the first call compiles

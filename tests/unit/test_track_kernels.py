@@ -36,6 +36,7 @@ from railsim.kernels.contact_columns import (
     J_SLIP,
     M_Z,
     NORMAL,
+    NORMAL_STIFFNESS,
     NORMAL_Y,
     NORMAL_Z,
     PATCH_ROWS,
@@ -63,6 +64,7 @@ from railsim.kernels.contact_columns import (
     XI_Y,
     A,
 )
+from railsim.kernels.contact_table import G_ROLL, G_Y, K2_ROLL, K2_Y, K_ROLL, K_Y, LOOK_UP_SIZE
 from railsim.kernels.lanes import LANES
 from railsim.kernels.learning import LEARNT_SIZE
 from railsim.kernels.rails import CHANGE_ROLL, CHANGE_Y, CHANGE_Z, CHANGES, PLANE_SIZE, RAIL_SIZE
@@ -274,6 +276,37 @@ def test_patches_that_load_each_other_share_a_motion_as_their_equations_say(touc
     matrix = np.eye(n) + k[of, None] * kappa[np.ix_(of, of)]
     np.testing.assert_allclose(patch[rows, 1:-1].T, np.linalg.solve(matrix, (k * normal)[:, of].T))
     assert not patch[:, [0, -1]].any()
+
+
+def test_stiffness_of_a_patch_is_how_its_force_changes_with_the_motion_of_the_wheel(plain):
+    """Of V = p^1.5 (K + sqrt(p) K_2) over y, z and roll; of N = V/cos g along the normal, p cos g.
+
+    p is z less the gap, of which G_Y, G_ROLL are the slopes as K_Y, K_ROLL are those of K; y and
+    roll count from the left rail as if mirrored.
+    """
+    t, patch, g, k = np.zeros(2 * LOOK_UP_SIZE), np.zeros((PATCH_ROWS, 3)), 0.7, LOOK_UP_SIZE
+    t[[k, k + 1, k + 2]] = -1e-4, 1e11, 3e12
+    t[[k + G_Y, k + G_ROLL]] = -0.84, 0.21
+    t[[k + K_Y, k + K_ROLL, k + K2_Y, k + K2_ROLL]] = 4e12, -3e12, 2e14, 1e14
+    work = Record(patch=patch, look_up=t)
+    system = Record(support=Record(elastic=1), contact=Record(load=[50e3]))
+    patch[ANGLE_COS, 2] = np.cos(g)
+    plain(contact_damping)
+
+    def vertical(x, sign):
+        y, z, roll = x
+        p = z - t[k] - sign * (y * t[k + G_Y] + roll * t[k + G_ROLL])
+        K, K2 = t[[k + 1, k + 2]] + sign * (
+            y * t[[k + K_Y, k + K2_Y]] + roll * t[[k + K_ROLL, k + K2_ROLL]]
+        )
+        return p**1.5 * (K + np.sqrt(p) * K2)
+
+    for sign in (-1.0, 1.0):
+        V = vertical(np.zeros(3), sign)
+        contact_damping.note_stiffness(system, work, 0, 2, k, sign, 1e-4, V)
+        slopes = approx_fprime(np.zeros(3), lambda x, sign=sign: vertical(x, sign), 1e-11)
+        assert patch[[FORCE_PER_Y, FORCE_PER_Z, FORCE_PER_ROLL], 2] == pytest.approx(slopes, 1e-4)
+        assert patch[NORMAL_STIFFNESS, 2] == pytest.approx(slopes[1] / np.cos(g) ** 2, 1e-4)
 
 
 def test_a_patch_takes_its_slip_and_its_approach_from_the_wheelsets_speeds(plain):

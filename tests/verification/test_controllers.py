@@ -2,14 +2,20 @@
 
 import numpy as np
 import pytest
+from dynamics import Settings, load_track
+from test_actuators import on_axle
 
 import railsim
 from railsim import laws
 from railsim.assessment.weighting import WF
 from railsim.errors import InputError
+from railsim.kernels import actuators, controllers, element_outputs
+from railsim.kernels.state import velocity_begin
 from railsim.linear.closed_loop import closed_loop
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.vehicle import LinearVehicle
+from railsim.model.assembly import assemble
+from railsim.model.work import work_arrays
 
 G = 9.80665
 ENDS = {"front": 9.5, "rear": -9.5}
@@ -174,3 +180,22 @@ def test_weighting_of_motion_sickness():
     table = {0.1: 695, 0.16: 1006, 0.2: 992, 0.25: 854, 0.4: 384, 0.5: 224}
     gains = WF.gain(np.array(list(table)))
     assert np.allclose(1e3 * gains, list(table.values()), rtol=0.01)
+
+
+def test_signals_of_two_actuators_are_each_its_own(plain):
+    """Torques about two axles, given by two commands, and speeds that they turn with."""
+    system = assemble(on_axle(), load_track("straight"), Settings()).system
+    work, state = work_arrays(system), np.zeros(200)
+    work.memory[system.actuators.which[:, actuators.COMMAND]] = torques = [3e3, -1e3]
+    work.pose[:, [0, 4, 8]] = 1.0
+    axles = velocity_begin(system.bodies.kind.size) + 6 * system.actuators.body[:, 1] + 4
+    state[axles] = speeds = [0.5, -2.0]
+    which = np.zeros((4, controllers.SIGNAL_WHICH), dtype=np.int64)
+    which[:, controllers.GROUP], which[:, controllers.OF] = controllers.ACTUATOR, [0, 1, 0, 1]
+    torque, rate = element_outputs.MOMENT + 1, element_outputs.RATE + 4
+    which[:, controllers.COMPONENT] = torque, torque, rate, rate
+    system = system._replace(signals=system.signals._replace(which=which))
+    for module in (actuators, controllers):
+        plain(module)
+    found = [controllers.element_signal(system, work, state, i) for i in range(4)]
+    assert found == pytest.approx([*torques, *speeds])

@@ -59,8 +59,11 @@ class OneWheel:
         self.rise = model.rails.tables[0].description["rise"]
         self.work = work_arrays(self.system)
 
-    def at(self, s, y, z):
-        """Forces on the rail x, y, z, then the patches of wing and nose: number and column."""
+    def at(self, s, y, z, down=0.0):
+        """Forces on the rail x, y, z, then the patches of wing and nose: number and column.
+
+        `down`: speed of the wheelset [m/s].
+        """
         system, work = self.system, self.work
         b, n = int(system.contact.body[0]), len(system.bodies.kind)
         state = np.zeros(self.model.n_state)
@@ -70,6 +73,7 @@ class OneWheel:
             state[6 * other + 2] = -0.02
             state[6 * n + 6 * other + 4] = -4.3481181
         assert system.bodies.row[b, RADIUS] == 0.46
+        state[6 * n + 6 * b + 2] = down
         state[6 * b + 1 : 6 * b + 3] = 1e-3 * y + ASIDE, 1e-3 * z + self.rise
         status, _, count = right_hand_side(system, work, state, np.zeros_like(state))
         assert status == 0
@@ -295,6 +299,20 @@ def test_a_wheelset_in_the_middle_is_foreseen_the_same_from_both_sides(wheel):
             rates[side, k] = work.force_rate[0]
     work.watch[AHEAD] = 0.0
     np.testing.assert_allclose(rates[1], rates[0], rtol=1e-6)
+
+
+def test_forces_over_the_crossing_do_not_depend_on_how_far_is_foreseen(wheel):
+    """Of a wheel that is pressed onto changing rails; what is foreseen divides steps alone."""
+    work, found = wheel.work, []
+    for ahead in (0.0, 1e-2):
+        work.watch[AHEAD] = ahead
+        for place in np.linspace(-300.0, 460.0, 20):
+            wheel.at(place, -1e3 * ASIDE, -0.3, down=0.2)
+            found.append(work.rail_force[wheel.system.contact.body[0], :6].copy())
+    work.watch[AHEAD] = 0.0
+    without, foreseen = np.reshape(found, (2, 20, 6))
+    assert abs(without[:, 2]).max() > 1e4
+    np.testing.assert_allclose(foreseen, without, rtol=1e-9, atol=1e-9)
 
 
 def test_shares_of_the_rails_add_up():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from dynamics import load_any_track, load_track, load_vehicle
 from independent_contact import rail_points
+from scipy.spatial.transform import Rotation
 from test_loads import GRAVITY, MASS, wagon
 from test_one_sided import with_elements
 
@@ -13,7 +14,12 @@ import railsim
 from railsim.animation import result_scene
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.support import PRESETS
+from railsim.kernels import element_columns, element_outputs, elements, internal
+from railsim.kernels.element_columns import BOTH_ENDS, MOUNT_COLUMNS
+from railsim.kernels.system import ANGULAR, FORCE, MOMENT, POSITION, VELOCITY
+from railsim.model.assembly import assemble
 from railsim.model.statics import _shortening
+from railsim.model.work import work_arrays
 
 X, Y, Z, ROLL, PITCH, YAW = range(6)
 BAR, BAR_DAMPING, DAMPER = 8e5, 1.5e4, 2e4
@@ -83,6 +89,37 @@ def test_power_of_all_elements_is_the_energy_that_the_body_loses(shaken):
     lost = np.abs(taken).max()
     assert lost > 500.0
     np.testing.assert_allclose(energy[0] - energy, taken, atol=0.005 * lost)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_power_of_mounts_is_what_their_forces_take_from_the_bodies(seed, plain):
+    """-sum (F . v + M . omega) in any attitude and motion, of any springs, dampers and preloads."""
+    model = assemble(load_vehicle("coach_manchester"), load_track("straight"), Settings())
+    random, mounts = np.random.default_rng(seed), model.system.mounts
+    row = mounts.row.copy()
+    for name in ("stiffness", "damping", "preload"):
+        row[:, MOUNT_COLUMNS[name]] = 1e4 * random.normal(size=(len(row), 3))
+    system = model.system._replace(mounts=mounts._replace(row=row))
+    work, n = work_arrays(system), system.bodies.kind.size
+    turned = Rotation.from_rotvec(0.3 * random.normal(size=(n, 3)))
+    work.pose[:, :9] = turned.as_matrix().reshape(n, 9)
+    for first in (POSITION, VELOCITY, ANGULAR):
+        work.pose[:, first : first + 3] = random.normal(size=(n, 3))
+    inner = 1e3 * random.normal(size=system.internal.kind.size)
+    for module in (internal, element_columns, elements, element_outputs):
+        plain(module)
+    elements.mount_forces(system, work, inner)
+    given = np.zeros(n)
+    for motion, force in ((VELOCITY, FORCE), (ANGULAR, MOMENT)):
+        given += np.einsum(
+            "bi,bi->b", work.pose[:, motion : motion + 3], work.pose[:, force : force + 3]
+        )
+    out = np.zeros((system.mounts.body.shape[0], element_outputs.RATE + 6))
+    for e in range(len(out)):
+        element_outputs.mount_output(system, work, inner, e, e, out)
+    power = out[:, element_outputs.POWER]
+    assert mounts.flags[:, BOTH_ENDS].any()
+    assert power.sum() == pytest.approx(-given.sum(), abs=1e-9 * abs(power).sum())
 
 
 def test_deflections_are_those_of_the_bodies(shaken):

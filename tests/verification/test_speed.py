@@ -8,6 +8,13 @@ from selection import points
 
 import railsim
 from railsim.errors import Fault, InputError
+from railsim.kernels.contact_columns import J_CROSS
+from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.state import velocity_begin
+from railsim.kernels.status import RUNNING
+from railsim.model.assembly import assemble
+from railsim.model.equilibrium import equilibrium
+from railsim.model.work import work_arrays
 from railsim.result import open_result
 from railsim.result.tables import result_parts
 from railsim.simulation import Simulation, preparation, run_in, simulate
@@ -138,6 +145,23 @@ def test_jump_at_low_speed_is_off_by_the_square_of_the_step(straight):
     error = np.max(np.abs(half.Y - whole.Y)[late])
     assert error < 0.03 * largest
     assert np.max(np.abs(quarter.Y - half.Y)[late]) < error / 3.0
+
+
+def test_wheelsets_that_stand_alike_are_damped_alike_at_walking_pace(straight):
+    """Aside and yawed by the same: the last patch couples its directions as the first one does."""
+    model = assemble(load_vehicle("coach_manchester"), straight, Settings())
+    system, state = model.system, equilibrium(model, 0.5).state.copy()
+    body, begin = system.contact.body, velocity_begin(system.bodies.kind.size)
+    for first in (0, begin):
+        for k in range(first, first + 6):
+            state[6 * body + k] = state[6 * body[0] + k]
+    state[6 * body + 1], state[6 * body + 5] = 3e-3, 2e-3
+    work = work_arrays(system)
+    status, _, _ = right_hand_side(system, work, state, np.zeros_like(state))
+    assert status == RUNNING
+    found = work.contact_jacobian[body]
+    assert abs(found[0, J_CROSS : J_CROSS + 3]).max() > 50.0  # kg/s; those of the first one
+    np.testing.assert_allclose(found, found[:1].repeat(len(body), axis=0), rtol=1e-6, atol=1e-3)
 
 
 def test_a_disturbance_of_its_own_is_refused_where_a_run_goes_on(bogie, straight):
