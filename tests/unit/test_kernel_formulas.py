@@ -65,7 +65,17 @@ from railsim.kernels.contact_columns import (
     XI_X,
     XI_Y,
 )
-from railsim.kernels.contact_table import G_ROLL, G_Y, LOOK_UP_SIZE
+from railsim.kernels.contact_table import (
+    G_ROLL,
+    G_Y,
+    K2,
+    K2_ROLL,
+    K2_Y,
+    K_ROLL,
+    K_Y,
+    LOOK_UP_SIZE,
+    K,
+)
 from railsim.kernels.internal import PAD
 from railsim.kernels.rails import (
     ASIDE,
@@ -555,6 +565,53 @@ def test_slopes_of_a_limited_continuation_are_its_derivatives():
     assert there(x) + share * (here(x) - there(x)) == pytest.approx(0.5 * there(x))
     assert [part_y, part_roll] == pytest.approx(approx_fprime(x, lambda at: part(at)[0]), rel=1e-5)
     assert contact_table.allowed_part.py_func(3.0, 0.4, -0.7, 2.0, -0.3, 0.5) == (1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("falls", [(0.9, 0.5), (0.4, 1.1)])
+def test_stiffness_beyond_the_last_node_has_the_slopes_of_what_is_left(falls, plain, monkeypatch):
+    """Of both its parts over y and roll, whichever of them limits it."""
+    plain(contact_table)
+    names = ((K, K_Y, K_ROLL), (K2, K2_Y, K2_ROLL))
+    at_end = [lambda x: 2.0 + 0.3 * x[0] - 0.5 * x[1], lambda x: 9e2 - 90.0 * x[0] + 70.0 * x[1]]
+
+    def nodes(x, start, row, slab, weights, tw, out, first):
+        for columns, end, fall in zip(names, at_end, falls, strict=True):
+
+            def value(x, end=end, fall=fall):
+                return end(x) * (1.0 - (fall + 0.2 * x[0] + 0.1 * x[1]) * (tw - 1.0))
+
+            out[first + np.array(columns)] = value(x), *approx_fprime(x, value)
+
+    monkeypatch.setattr(contact_table, "_sum_of_nodes", nodes)
+
+    def fields(x, tw=2.4):
+        out = np.ones(2 * LOOK_UP_SIZE)
+        contact_table.continue_limited(x, 0, 0, 0, None, tw, out, LOOK_UP_SIZE)
+        return out[LOOK_UP_SIZE:]
+
+    x = np.array([0.1, -0.2])
+    found = fields(x)
+    assert found[K] > 0.0 > 1.0 - 1.4 * max(falls)
+    for value, *slopes in names:
+        slope = approx_fprime(x, lambda x, value=value: fields(x)[value], 1e-6)
+        np.testing.assert_allclose(found[slopes], slope, rtol=1e-4)
+
+
+@pytest.mark.parametrize("z", [0.5e-4, 1.3e-4, 3.5e-4])
+def test_overlap_of_a_patch_is_its_integral_and_its_width_the_slope_of_that(z):
+    """Between candidates linear, nothing where it is negative."""
+    random, theta = np.random.default_rng(28), 1e-5
+    h = 1e-4 * np.array([3.0, 0.2, 0.9, 1.6, 4.0, 0.7])
+    lift, du, x = random.uniform(1.0, 1.5, 6), random.uniform(size=5), np.linspace(0.0, 1.0, 20001)
+
+    def over(z):
+        v = z - h - theta * lift
+        between = np.outer(1.0 - x, v[:-1]) + np.outer(x, v[1:])
+        return trapezoid(np.maximum(between, 0.0), x, axis=0) @ du
+
+    found = elastic_patch.overlap.py_func(z, theta, h, lift, du)
+    slope = (over(z + 1e-8) - over(z - 1e-8)) / 2e-8
+    assert found == pytest.approx((over(z), slope), rel=1e-4)
 
 
 def test_sums_over_a_patch_are_integrals_of_its_overlap():

@@ -4,6 +4,7 @@ from types import SimpleNamespace as Record
 
 import numpy as np
 import pytest
+from scipy.optimize import approx_fprime
 
 from railsim.kernels import contact_geometry, linkage
 from railsim.kernels.linkage import CAM, REVOLUTE
@@ -17,6 +18,57 @@ def test_a_wheel_may_touch_between_the_last_two_of_its_candidates(touch, plain):
     plain(contact_geometry)
     contact_geometry.rigid_contact(wheel, -0.01, 0.01, level, level, 0.46, 0.0, 0.0, found)
     assert found == pytest.approx([0.0, touch, 0.46, touch, 0.0, round(1e3 * touch)])
+
+
+@pytest.mark.parametrize("roll", [-0.4, 0.0, 0.17, 0.31])
+def test_a_rolled_wheel_touches_level_rails_where_its_tread_is_level(roll, plain):
+    """Of a parabola r = R - (u - u0)^2/(2 rho) at u0 + rho tan(roll), whatever its candidates."""
+    u, level, found, rho = 1e-3 * np.arange(-9.0, 10.0), np.zeros(4), np.zeros(6), 0.012
+    wheel = np.array([u, 0.46 - (u - 1.3e-3) ** 2 / (2.0 * rho), -(u - 1.3e-3) / rho])
+    plain(contact_geometry)
+    contact_geometry.rigid_contact(wheel, -1.0, 0.01, level, level, 0.46, 0.0, roll, found)
+    t = np.tan(roll)
+    at, radius = 1.3e-3 + rho * t, 0.46 - 0.5 * rho * t**2
+    gap = 0.46 - at * np.sin(roll) - radius * np.cos(roll)
+    aside = at * np.cos(roll) - radius * np.sin(roll)
+    expected = [gap, at, radius, aside, 0.0]
+    assert found[:5] == pytest.approx(expected, abs=1e-12)
+
+
+def one_driver(kind, point_1, point_2):
+    """Two bodies with points on them, and a driver."""
+    random = np.random.default_rng(3)
+    return Record(
+        n_bodies=2, joint=np.zeros((0, 6), dtype=np.int64), point=random.normal(size=(1, 2, 2)),
+        point_body=np.array([1, 2]), driver=np.array([kind, point_1, point_2]),
+        driver_value=np.array([0.3]), value=np.zeros((1, 0, 2)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "driver", [(linkage.ANGLE, 2, 0), (linkage.LENGTH, 0, 1), (linkage.X, 1, 0), (linkage.Y, 1, 0)]
+)
+def test_what_drives_a_mechanism_has_its_own_derivatives(driver, plain):
+    """Row of the Jacobian, and -(Phi_qq v) v along any motion."""
+    given, (one, two) = one_driver(*driver), np.zeros((2, 4))
+    random, J, right = np.random.default_rng(4), np.zeros((6, 6)), np.zeros(6)
+    q, v = random.normal(size=(2, 3, 3))
+    q[0] = v[0] = 0.0
+    plain(linkage)
+
+    def residual(moved):
+        Phi, pose = np.zeros(6), q.copy()
+        pose[1:] = np.reshape(moved, (2, 3))
+        linkage.drive(given, 0, pose, 0.2, Phi, np.zeros((6, 6)), 5, one, two)
+        return Phi[5]
+
+    linkage.drive(given, 0, q, 0.2, np.zeros(6), J, 5, one, two)
+    at, way = q[1:].ravel(), v[1:].ravel()
+    assert J[5] == pytest.approx(approx_fprime(at, residual), abs=1e-6)
+    linkage.curvature(given, 0, None, q, v, right, one, two)
+    h = 1e-4
+    second = (residual(at + h * way) - 2.0 * residual(at) + residual(at - h * way)) / h**2
+    assert right[5] == pytest.approx(-second, abs=1e-5)
 
 
 @pytest.mark.parametrize(("angle", "found"), [(0.5, 0), (-0.2, -2), (1.8, -2)])

@@ -362,6 +362,75 @@ def test_a_track_that_is_corrected_is_as_if_its_step_had_had_the_corrected_mean_
         assert not change[1, first : first + DOF].any()  # this one's forces are balanced
 
 
+def test_a_correction_that_has_waited_is_that_of_the_step_before(plain):
+    """Of its length and weight; the track goes on by h r, its rate (1 + g) r - g times the last."""
+    random, h, last, before = np.random.default_rng(24), 2e-3, 3e-3, 0.3
+    system = Record(
+        bodies=Record(kind=np.zeros(1)), internal=Record(kind=np.zeros(0)),
+        contact=Record(transient=0, body=np.zeros(2)),
+        support=Record(row=random.uniform(0.5, 2.0, SUPPORT_ROW), sleeper=1, massless=0),
+    )  # fmt: skip
+    for module in (support, support_step):
+        plain(module)
+    begin = support.support_begin(system)
+    state = random.normal(size=begin + 2 * SUPPORT_SIZE)
+    work = Record(
+        support=random.uniform(0.1, 0.4, (2, 2, SUPPORT_COLUMNS)),
+        support_step=random.uniform(0.5, 2.0, (2, SUPPORT_STEP)),
+    )
+    state[begin:].reshape(2, SUPPORT_SIZE)[:, WEIGHT] = before
+    learnt = [begin + SUPPORT_SIZE * w + LEARNT + LEARNT_SIZE * k for w in (0, 1) for k in (0, 1)]
+    wheels, change = support_step.eight_in_pairs(0, 2), random.normal(size=(7, LANES))
+    change[:, 4:] = np.tile(change[:, 2:4], 2)
+
+    def stepped(given, waits):
+        after = given.copy()
+        work.support_step[:, PENDING] = waits
+        support_step.step_tracks(
+            system, work, after, wheels, learnt + 2 * learnt[2:], change, h, last
+        )
+        return after[begin:].reshape(2, SUPPORT_SIZE)
+
+    corrected, c = state.copy(), 1.0 + before
+    moved = corrected[begin:].reshape(2, SUPPORT_SIZE)
+    r = work.support_step[:, :DOF]
+    for first, factor in ((0, last), (RATE, c), (MEAN_RATE, 1.0), (MEAN_CHANGE, c / last)):
+        moved[:, first : first + DOF] += factor * r
+    found = stepped(state, 1.0)
+    np.testing.assert_allclose(found, stepped(corrected, 0.0), rtol=1e-9, atol=1e-9)
+    u, rate, mean, slower = (moved[:, k : k + DOF] for k in (0, RATE, MEAN_RATE, MEAN_CHANGE))
+    g, r = h / (h + last), found[:, MEAN_RATE : MEAN_RATE + DOF]
+    after = (1.0 + g) * r - g * mean
+    for first, expected in (
+        (0, u + h * r),
+        (RATE, after),
+        (MEAN_CHANGE, (after - rate) / h),
+        (ACCELERATION, (1.0 + g) * (after - rate) / h - g * slower),
+    ):
+        np.testing.assert_allclose(found[:, first : first + DOF], expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("sleeper", [0, 1])
+def test_rails_without_mass_yield_to_a_force_as_their_matrices_say(sleeper, plain):
+    """(c M/h + C + h K/c) u' = F of equal forces on both rails; with a mass on rigid ground too."""
+    row, h, c = np.random.default_rng(25).uniform(0.5, 2.0, SUPPORT_ROW), 0.1, 1.3
+    system = Record(
+        bodies=Record(kind=np.zeros(1)), internal=Record(kind=np.zeros(0)),
+        contact=Record(transient=0, body=np.zeros(1)), support=Record(row=row, sleeper=sleeper),
+    )  # fmt: skip
+    plain(support)
+    begin = support.support_begin(system)
+    work, state = Record(compliance=np.zeros(3)), np.zeros(begin + SUPPORT_SIZE)
+    state[begin + WEIGHT], state[LAST_STEP] = c - 1.0, h
+    row[M_RAIL] *= 1 - sleeper
+    support.step_compliance(system, work, state)
+    M, C, K = (part[: 7 if sleeper else 4, : 7 if sleeper else 4] for part in matrices(row, 1, 1))
+    force = np.zeros((len(M), 2))
+    force[[0, 2], 0] = force[[1, 3], 1] = 1.0
+    rate = np.linalg.solve(c / h * M + C + h / c * K, force)
+    assert work.compliance == pytest.approx([rate[0, 0], rate[1, 1], h / c])
+
+
 def test_rates_beside_the_rails_change_by_the_rails_slopes_and_the_acceleration(plain):
     """Until a time later: V (slope now less slope then) and h times the acceleration."""
     random, h, speed, now = np.random.default_rng(12), 5e-3, 20.0, 0.3

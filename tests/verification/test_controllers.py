@@ -199,3 +199,13 @@ def test_signals_of_two_actuators_are_each_its_own(plain):
         plain(module)
     found = [controllers.element_signal(system, work, state, i) for i in range(4)]
     assert found == pytest.approx([*torques, *speeds])
+
+
+def test_noise_is_drawn_from_generators_of_full_period():
+    """Each of the three goes through all numbers below its prime (Wichmann, Hill 1982)."""
+    memory, found = np.ones(3), []
+    for _ in range(30322):
+        controllers.uniform.py_func(memory, 0)
+        found.append(memory.copy())
+    for k, prime in enumerate((30269, 30307, 30323)):
+        assert np.flatnonzero(np.array(found)[:, k] == 1.0)[0] == prime - 2

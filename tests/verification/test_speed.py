@@ -148,7 +148,10 @@ def test_jump_at_low_speed_is_off_by_the_square_of_the_step(straight):
 
 
 def test_wheelsets_that_stand_alike_are_damped_alike_at_walking_pace(straight):
-    """Aside and yawed by the same: the last patch couples its directions as the first one does."""
+    """Aside and yawed by the same: the last patch couples its directions as the first one does.
+
+    And once more: nothing is left of the evaluation before.
+    """
     model = assemble(load_vehicle("coach_manchester"), straight, Settings())
     system, state = model.system, equilibrium(model, 0.5).state.copy()
     body, begin = system.contact.body, velocity_begin(system.bodies.kind.size)
@@ -162,6 +165,8 @@ def test_wheelsets_that_stand_alike_are_damped_alike_at_walking_pace(straight):
     found = work.contact_jacobian[body]
     assert abs(found[0, J_CROSS : J_CROSS + 3]).max() > 50.0  # kg/s; those of the first one
     np.testing.assert_allclose(found, found[:1].repeat(len(body), axis=0), rtol=1e-6, atol=1e-3)
+    right_hand_side(system, work, state, np.zeros_like(state))
+    np.testing.assert_array_equal(work.contact_jacobian[body], found)
 
 
 def test_a_disturbance_of_its_own_is_refused_where_a_run_goes_on(bogie, straight):

@@ -50,6 +50,17 @@ def test_static_deflection_is_the_load_over_the_stiffness_of_the_chain(preset):
     np.testing.assert_allclose(balance.Q0, rigid.Q0, rtol=2e-5)
 
 
+def test_patches_that_are_evaluated_again_are_counted_once():
+    """Of a wheelset that is thrown against its rail; as many as outputs at every step show."""
+    aside = {"front.outer.wheelset": {"y": 5e-3, "vy": 0.4}}
+    how = {"step": 2.5e-4, "output_rate": 4000.0, "outputs": {"contact_patches": True}}
+    settings = Settings.model_validate({**how, "initial": aside})
+    coach = load_vehicle("coach_manchester")
+    run = simulate(coach, on("ballasted"), speed=20.0, duration=0.02, settings=settings)
+    assert run.attributes["contacts_evaluated_again"] > 10
+    assert run.attributes["patches_evaluated"] == np.count_nonzero(run["patch_N"])
+
+
 # one wheelset under a constant force: mass of a wheel, static wheel load of Manchester vehicle 1
 MU, P0 = 906.5, 54546.0
 RAIL = PRESETS["p2"]
