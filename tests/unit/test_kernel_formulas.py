@@ -450,6 +450,25 @@ def test_a_wheel_beyond_the_tables_of_rails_is_held_at_their_edge(y, roll):
     assert found == pytest.approx(np.clip(stretched, -0.011, 0.011), rel=1e-5)
 
 
+def test_slope_of_a_rail_is_that_between_its_nodes_and_stays_where_it_ends(plain):
+    """Of the nearest node in y and roll; a zone that the next node has not goes on as it is."""
+    random = np.random.default_rng(29)
+    rails = Record(values=random.normal(size=(3, 3, 1, 2, 2, 1)), part=np.array([[0, 3]]))
+    rails.node_s, rails.node_zone = np.array([0.0, 1.0, 3.0]), np.array([[0, 1], [3, 4], [6, -1]])
+    weights = np.zeros(16)
+    weights[[1, 2, 9, 10]] = 0.3, 0.7, 0.6, 0.4
+    plain(rail_parts)
+
+    def fall(zone, s):
+        return rail_parts.fall_at(rails, 0, zone, s, 7.0, (0, 0, 0), weights)
+
+    given = rails.values[:, 0, 0, 0, 1, 0], rails.values[:, 1, 0, 0, 1, 0]
+    assert fall(0, 0.4) == pytest.approx(given[0][1] - given[0][0])
+    assert fall(0, 1.5) == pytest.approx((given[0][2] - given[0][1]) / 2.0)
+    assert fall(1, 0.4) == pytest.approx(given[1][1] - given[1][0])
+    assert [fall(1, 1.5), fall(0, 3.1), fall(0, -0.1)] == [7.0] * 3
+
+
 def surface_of(values, y_0, dy):
     """Surface of a wheel, heights with their slopes at angles and widths, after another one."""
     n_phi, n_y, _ = values.shape

@@ -5,7 +5,7 @@ import pytest
 from dynamics import Settings, evaluate, load_vehicle, steady
 
 from railsim.definitions.loading import load_track
-from railsim.kernels.contact_columns import J_NORMAL, J_SLIP
+from railsim.kernels.contact_columns import FOOT_X, FOOT_X_PER_YAW, J_NORMAL, J_SLIP, NORMAL
 from railsim.kernels.contact_table import FLANGE, FLANGE_ROOT, TREAD
 from railsim.kernels.support import (
     D_Y_SLIP,
@@ -109,3 +109,18 @@ def test_a_rails_slope_is_no_slip(vehicle, speed):
     track = load_track("straight").replace(irregularities=[rough])
     did = simulate(load_vehicle(vehicle), track, speed=speed, until=200.0).attributes
     assert did["contacts_evaluated_again"] < 0.02 * 4 * did["steps"]
+
+
+def test_a_patch_moves_ahead_by_the_yaw_of_its_wheel():
+    """On both sides, as differences of two evaluations show."""
+    balance = steady(load_vehicle("coach_manchester"), load_track("straight"), Settings(), 20.0)
+    found = []
+    for yaw in (-1e-4, 1e-4):
+        state = balance.state.copy()
+        state[6 * balance.model.system.contact.body + 5] = yaw
+        found.append(evaluate(balance.model.system, state)[0].patch)
+    carries = (found[0][NORMAL] > 0.0) & (found[1][NORMAL] > 0.0)
+    per_yaw = (found[1] - found[0])[FOOT_X, carries] / 2e-4
+    assert np.ptp(per_yaw) > 0.1
+    given = found[0][FOOT_X_PER_YAW, carries]
+    np.testing.assert_allclose(given, per_yaw, rtol=1e-4)

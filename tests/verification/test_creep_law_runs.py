@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from dynamics import Settings, evaluate, load_track, load_vehicle
+from dynamics import Settings, evaluate, load_track, load_vehicle, steady
 from rig import DATA, test_vehicle
 from selection import points
 
@@ -15,6 +15,7 @@ from railsim.contact.creep import LAWS, creep_force
 from railsim.definitions.mirror import mirrored_track
 from railsim.kernels import contact_columns as columns
 from railsim.kernels.contact_table import A1, B1, D_B1
+from railsim.kernels.state import velocity_begin
 from railsim.result import open_result
 from railsim.simulation import preparation, prepare, simulate
 
@@ -241,3 +242,16 @@ def test_run_within_the_range_has_no_remark(bogie):
     result = in_curve(bogie, "table")
     assert result.attributes["patches_out_of_range"] == 0
     assert not any("range" in remark for remark in result.remarks)
+
+
+@pytest.mark.parametrize("k", [1.0, 0.3])
+def test_slope_of_the_creep_force_is_that_on_a_third_body(k):
+    """Along, of wheels that turn 0.02 % faster: what is foreseen is the force over the slip."""
+    track = load_track("straight").replace(third_body=(k, k), friction=(0.9, 0.9))
+    balance = steady(load_vehicle("coach_manchester"), track, settings("linear"), SPEED)
+    system, state = balance.model.system, balance.state.copy()
+    state[velocity_begin(system.bodies.kind.size) + 6 * system.contact.body + 4] -= 2e-4 * SPEED
+    patch = evaluate(system, state)[0].patch
+    patch = patch[:, patch[columns.NORMAL] > 1e4]
+    expected = patch[columns.T_X] / (SPEED * patch[columns.XI_X])
+    np.testing.assert_allclose(patch[columns.SECANT_ALONG], expected, rtol=0.1)

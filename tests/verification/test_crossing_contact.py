@@ -59,10 +59,10 @@ class OneWheel:
         self.rise = model.rails.tables[0].description["rise"]
         self.work = work_arrays(self.system)
 
-    def at(self, s, y, z, down=0.0):
+    def at(self, s, y, z, down=0.0, aside=0.0):
         """Forces on the rail x, y, z, then the patches of wing and nose: number and column.
 
-        `down`: speed of the wheelset [m/s].
+        `down`, `aside`: speed of the wheelset [m/s].
         """
         system, work = self.system, self.work
         b, n = int(system.contact.body[0]), len(system.bodies.kind)
@@ -73,7 +73,7 @@ class OneWheel:
             state[6 * other + 2] = -0.02
             state[6 * n + 6 * other + 4] = -4.3481181
         assert system.bodies.row[b, RADIUS] == 0.46
-        state[6 * n + 6 * b + 2] = down
+        state[6 * n + 6 * b + 1 : 6 * n + 6 * b + 3] = aside, down
         state[6 * b + 1 : 6 * b + 3] = 1e-3 * y + ASIDE, 1e-3 * z + self.rise
         status, _, count = right_hand_side(system, work, state, np.zeros_like(state))
         assert status == 0
@@ -313,6 +313,21 @@ def test_forces_over_the_crossing_do_not_depend_on_how_far_is_foreseen(wheel):
     without, foreseen = np.reshape(found, (2, 20, 6))
     assert abs(without[:, 2]).max() > 1e4
     np.testing.assert_allclose(foreseen, without, rtol=1e-9, atol=1e-9)
+
+
+def test_a_flange_that_comes_near_within_a_step_is_foreseen(wheel):
+    """While the tread carries; by more than half of what the load will have risen by then."""
+    work, ahead, speed, place = wheel.work, 5e-3, 1.0, -380.0
+    loads, z = [], wheel.under(30e3, place, -1e3 * ASIDE)[0]
+    for y in (0.0, 1e3 * speed * ahead):  # mm
+        wheel.at(place, y - 1e3 * ASIDE, z)
+        loads.append(-work.rail_force[wheel.system.contact.body[0], 2])
+    work.watch[AHEAD] = ahead
+    wheel.at(place, -1e3 * ASIDE, z, aside=speed)
+    work.watch[AHEAD] = 0.0
+    assert loads[0] > 1e3
+    assert loads[1] > 2.0 * loads[0]
+    assert work.force_rate[0] * ahead > 0.5 * (loads[1] - loads[0])
 
 
 def test_shares_of_the_rails_add_up():

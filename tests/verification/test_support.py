@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from dynamics import Settings, evaluate, load_track, load_vehicle, steady
+from scipy.signal import lsim
 from selection import points
 
 from railsim.definitions.track.support import PRESETS
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.kernels.contact_columns import W_Q, W_Y
+from railsim.kernels.contact_columns import NORMAL, W_Q, W_Y
 from railsim.kernels.contact_table import K2, K
 from railsim.kernels.rails import FRICTION, MIDDLE_Y, RAIL_BEND, THIRD_ROLL, locate_rails
 from railsim.kernels.state import N_SCALARS
@@ -16,6 +17,7 @@ from railsim.kernels.support import (
     BALLAST,
     DOF,
     PADS,
+    PATCHES,
     PENDING,
     RATE,
     SUPPORT_SIZE,
@@ -59,6 +61,41 @@ def test_patches_that_are_evaluated_again_are_counted_once():
     run = simulate(coach, on("ballasted"), speed=20.0, duration=0.02, settings=settings)
     assert run.attributes["contacts_evaluated_again"] > 10
     assert run.attributes["patches_evaluated"] == np.count_nonzero(run["patch_N"])
+
+
+def test_what_is_learnt_belongs_to_the_set_of_patches_that_carry():
+    """Tread 1, root of the flange 2, flange 4: of wheels in the middle and in the flange."""
+    balance = steady(load_vehicle("coach_manchester"), on("ballasted"), Settings(), 20.0)
+    system, found = balance.model.system, []
+    for aside in (0.0, 7e-3):
+        state = balance.state.copy()
+        state[6 * system.contact.body + 1] += aside
+        work, _ = evaluate(system, state)
+        wheels, patch = work.patch_index[:, :2], work.patch_index[:, 2]
+        carries = work.patch[NORMAL] > 0.0
+        for w, side in np.ndindex(4, 2):
+            here = np.flatnonzero((wheels == (w, side)).all(axis=1) & carries)
+            of_wheel = set(patch[here[here < work.events[:, 0].sum()]])
+            assert work.support[w, side, PATCHES] == sum(2**k for k in of_wheel)
+            found.append(work.support[w, side, PATCHES])
+    assert len(set(found)) > 1
+
+
+def test_rails_without_mass_follow_the_wheel_load_through_pads_and_ballast():
+    """Kelvin bodies in series, Q = k u + c u' of each, worked out by scipy from the load; 0.5 %."""
+    h, values = 5e-5, PRESETS["ballasted"]
+    how = {"scheme": "rk4", "step": h, "output_rate": 1.0 / h, "outputs": {"track": True}}
+    falls = {"front.outer.wheelset": {"vz": 0.05}}
+    run = simulate(
+        load_vehicle("coach_manchester"), on("ballasted"), speed=20.0, duration=0.01,
+        settings=Settings.model_validate({**how, "initial": falls}),
+    )  # fmt: skip
+    load, moved = run["Q"][:, 0, 0], run["rail_deflection_vertical"][:, 0, 0]
+    found, at_rest = np.zeros_like(load), run["Q0"][0, 0]
+    for k, c in (values.pad_vertical, values.ballast_vertical):
+        found += at_rest / k + lsim(([1.0], [c, k]), load - at_rest, run.time)[1]
+    assert np.ptp(moved) > 1e-4
+    np.testing.assert_allclose(moved, found, atol=5e-3 * np.ptp(moved))
 
 
 # one wheelset under a constant force: mass of a wheel, static wheel load of Manchester vehicle 1

@@ -152,6 +152,19 @@ def test_memory_belongs_to_the_state(coach):
         np.testing.assert_array_equal(second[name], whole[name][half:])
 
 
+def test_a_struck_wheelset_builds_up_its_forces_as_by_the_reference_scheme(coach):
+    """Over the first 10 ms within 2 %; in steady rolling they are there at once, 5 % and more."""
+    track = load_track("straight").with_values(RIGID)
+    fine = STRUCK | {"output_rate": 2000.0}
+    every = settings(**fine), settings(**fine, scheme="rk4"), load_settings().with_values(fine)
+    mine, reference, at_once = (
+        simulate(coach, track, duration=0.01, settings=one, **RUN)["Y"][1:] for one in every
+    )
+    scale = np.ptp(mine, axis=0).max()
+    assert np.abs(mine - reference).max() < 0.02 * scale
+    assert np.abs(mine - at_once).max() > 0.05 * scale
+
+
 @FURTHER
 def test_reference_scheme_agrees(coach):
     """A wheelset thrown aside: within 1 % of the largest force, which steady rolling misses."""
