@@ -186,8 +186,8 @@ def strip_influence() -> kernel.Strips:
     angle = 0.5 * np.pi * u**3
     distance = np.log(np.exp(x)[:, None] * np.tan(angle))
     inner = np.exp(np.interp(distance, x, np.log(J), left=np.nan, right=np.nan))
-    # beyond the grid: 2 ln(2/q) - 1 close by, pi/(2 q) far away
-    inner = np.where(distance < x[0], 2.0 * np.log(2.0) - 2.0 * distance - 1.0, inner)
+    # beyond the grid: 2 ln(4/q) - 2 close by, pi/(2 q) far away
+    inner = np.where(distance < x[0], 4.0 * np.log(2.0) - 2.0 * distance - 2.0, inner)
     inner = np.where(distance > x[-1], 0.5 * np.pi * np.exp(-distance), inner)
     jacobian = np.cos(angle) ** 2 * 0.5 * np.pi * 3.0 * u**2 * 0.5
     whole = 2.0 * np.sum(weights * jacobian * inner, axis=1)

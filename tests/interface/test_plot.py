@@ -588,6 +588,21 @@ def test_legend_of_an_overlay_has_as_many_columns_as_fit(result, words, count, c
     assert figure.legends[0]._ncols == columns
 
 
+def test_channels_of_a_recording_are_drawn_in_millimetres_with_their_signs():
+    s = np.arange(0.0, 500.0, 0.25)
+    y_left, z_left, y_right, z_right = rails = 1e-3 * np.sin(np.outer([0.3, 0.5, 0.7, 1.1], s))
+    channels = (
+        0.5 * (y_left + y_right),
+        0.5 * (z_left + z_right),
+        z_right - z_left,
+        y_right - y_left,
+    )
+    figure = recording_figure(np.c_[s, rails.T], np.c_[s, 2.0 * rails.T], "Line")
+    for axes, channel in zip(figure.axes[::2], channels, strict=True):
+        for line, times in zip(axes.lines, (1.0, 2.0), strict=True):
+            assert np.allclose(line.get_xydata(), np.c_[s, 1e3 * times * channel])
+
+
 def test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum(
     tmp_path, capsys, monkeypatch
 ):

@@ -1,5 +1,7 @@
 """Built-in profiles and profile files: what is recognised, put right and refused."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from profile_files import bare, csv_m, csv_mm, miniprof, points, simpack
@@ -8,7 +10,7 @@ from railsim.contact import build_contact_table, contact_geometry
 from railsim.contact.table import TableGrid
 from railsim.errors import InputError
 from railsim.profiles import Profile, load_profile
-from railsim.profiles.builtin import DEFINITIONS, RAIL_HEADS, cone
+from railsim.profiles.builtin import DEFINITIONS, RAIL_HEADS, S1002_SECTIONS, cone
 
 WHEEL, RAIL = points("S1002"), points("60E1")
 LATERAL = np.linspace(-0.005, 0.005, 21)
@@ -50,6 +52,14 @@ def test_arcs_of_a_rail_close_on_the_standards_head(name, half_width, depth):
     assert 1e3 * np.interp(1e-3 * depth, profile.z[profile.y > 0], profile.y[profile.y > 0]) == (
         pytest.approx(half_width, abs=2e-3)
     )
+
+
+@pytest.mark.parametrize(("inner", "outer"), pairwise(S1002_SECTIONS))
+def test_sections_of_s1002_join_at_their_ends_in_height_and_slope(inner, outer):
+    (end, one), (_, other) = S1002_SECTIONS[inner], S1002_SECTIONS[outer]
+    y = end + 1e-4 * np.arange(-1, 2)
+    assert one(y)[1] == pytest.approx(other(y)[1], abs=1.3e-4)  # mm; the standard's own steps
+    assert np.ptp(one(y)[::2]) == pytest.approx(np.ptp(other(y)[::2]), rel=2e-5)
 
 
 @pytest.mark.parametrize("name", DEFINITIONS)

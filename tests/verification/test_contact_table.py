@@ -200,6 +200,7 @@ def test_patch_under_load_lies_on_the_common_normal_of_two_circles(degrees):
         ellipse = hertz(
             0.5 * np.cos(theta) / 0.46, 0.5 / R_rail - 0.5 / R_wheel, patch.N, 2 * 82e9 * 1.28, 0.28
         )
+        assert 2.0 / 3.0 * patch.p_max * patch.area == pytest.approx(patch.N)  # half an ellipsoid
         loaded = np.arcsin(offset * np.sin(theta) / (offset + ellipse.approach))
         # turned from the angle of first touch as far as the line of centres, to a fifth of it
         assert patch.angle - theta == pytest.approx(loaded - theta, rel=0.2, abs=1.3e-3)

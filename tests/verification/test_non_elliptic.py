@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import elliprd, elliprf
 
@@ -24,6 +25,20 @@ def zone(y, h, radius):
 
 def patch(of, centre=0.0):
     return kik_piotrowski(of, 0, len(of.h), centre, DELTA, E_STAR, strip_influence())
+
+
+@pytest.mark.parametrize("node", [0, 400, 800])
+def test_influence_of_an_ellipse_is_the_double_integral(node):
+    strips = strip_influence()
+    ratio = np.exp(strips.start + node * strips.spacing)  # b/a
+
+    def strip(t):
+        q = abs(t) * ratio / np.sqrt(1.0 - t**2)
+        # u = asinh(x/q): no peak where q is small
+        return quad(lambda u: np.sqrt(1.0 - (q * np.sinh(u)) ** 2), 0.0, np.arcsinh(1.0 / q))[0]
+
+    whole = 4.0 * quad(lambda t: np.sqrt(1.0 - t**2) * strip(t), 0.0, 1.0)[0]
+    assert np.exp(strips.whole[node]) == pytest.approx(whole, rel=1e-4)
 
 
 def test_circle_is_the_closed_form():
