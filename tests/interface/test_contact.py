@@ -22,6 +22,7 @@ from railsim.contact.tables import (
     printed_functions,
 )
 from railsim.plot.contact import profiles_figure
+from railsim.plot.creep import _components
 from railsim.profiles import Profile, load_profile
 
 NAMES = (
@@ -335,6 +336,20 @@ def test_creep_table_is_built_from_the_rows_that_are_there(tmp_path, capsys):
     assert found["largest_difference"] == 0.0
     with np.load(found["file"]) as written:
         np.testing.assert_array_equal(written["force"], nodes.force)
+
+
+@pytest.mark.parametrize(
+    ("direction", "components"),
+    [
+        ((1, 0, 0), [0]),
+        ((0, 1, 0), [1]),
+        ((0, 0, 1), [1]),
+        ((1, 1, 0), [0, 1]),
+        ((1, 0, 1), [0, 1]),
+    ],
+)
+def test_lateral_forces_are_drawn_with_lateral_creepage_or_spin(direction, components):
+    assert [k for k, _ in _components(direction)] == components
 
 
 @pytest.mark.slow

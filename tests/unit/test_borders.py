@@ -22,7 +22,12 @@ from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.random import Random
 from railsim.definitions.excitations.sweep import Sweep
 from railsim.definitions.limits import RunningLimits, Zone
-from railsim.definitions.loading import load_comfort_limits, load_running_limits, load_wheel_limits
+from railsim.definitions.loading import (
+    load_comfort_limits,
+    load_running_limits,
+    load_spring,
+    load_wheel_limits,
+)
 from railsim.definitions.measurement import Channel
 from railsim.definitions.settings import Settings
 from railsim.definitions.spring import Fatigue, HelicalSpring, Search
@@ -31,6 +36,7 @@ from railsim.definitions.study.design import Optimise, Variable
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.rail_sections import Contour, RailSections
 from railsim.definitions.vehicle.laws import Signal
+from railsim.definitions.vehicle.names import size_faults
 from railsim.definitions.vehicle.out_of_round import RadiusTable
 from railsim.definitions.vehicle.out_of_round import Sections as WheelSections
 from railsim.definitions.vehicle.tables import Service
@@ -387,6 +393,14 @@ def exceeded(share):
     return Assessed.exceeded.fget(SimpleNamespace(estimate=estimate, limit=2.0))
 
 
+def index_remarks(ratio):
+    """Of an outer spring of 32 mm wire."""
+    suspension = load_spring("tare_laden_example")
+    size = {"wire_diameter": 0.03125, "mean_diameter": 0.03125 * ratio}
+    suspension = suspension.model_copy(update={"outer": suspension.outer.model_copy(update=size)})
+    return any("spring index" in remark.text for remark in suspension.unusual())
+
+
 # a function, and its values at a border and beside it
 AT_THE_BORDER = {
     "comfort is worse from a border of its classes on (EN 12299)": (
@@ -436,6 +450,13 @@ AT_THE_BORDER = {
     ),
     "and by pressure, here 3 times the hardness": (
         lambda p: archard_k(pressure=p), [(3.0, 1.0), (below(3.0), 4.0)]
+    ),
+    "EN 13906-1 covers hot coiled springs of an index from 3 to 12": (
+        index_remarks, [(2.99, True), (3.0, False), (12.0, False), (12.01, True)]
+    ),
+    "a vehicle of 200 wheelsets is one": (
+        lambda n: bool(size_faults({"wheelsets": {str(k): {} for k in range(n)}})),
+        [(200, False), (201, True)],
     ),
     "wear by the work of friction is severe above its transition": (
         severe, [(0.25, False), (above(0.25), True)]
