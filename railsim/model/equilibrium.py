@@ -5,7 +5,8 @@ Three steps, each on straight level track:
 1. preloads marked `auto` are solved so that every sprung body is in equilibrium in its nominal
    position; where there are more springs than conditions, all deflect alike as far as they can
    (least sum of F^2/k);
-2. without friction, Newton's method finds the position at rest; its wheel forces are Q0;
+2. without friction, Newton's method finds the position at rest, if need be after a descent from
+   the nominal one; its wheel forces are Q0;
 3. with friction and speed, it finds the steady rolling: positions and the spin of the wheelsets.
 
 A fixed body is first let down on its springs like any other, and held where it then stands; where
@@ -16,6 +17,7 @@ What cannot be balanced is named: body, component, force or moment.
 
 import hashlib
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -43,6 +45,10 @@ from railsim.notation import ROLL, SIDES, YAW, Z
 RESIDUAL = 1e-7  # largest acceleration left in equilibrium (m/s2, rad/s2)
 ONE_SIDED = 0.01  # least friction of a rail in the balance, as a share of the other's
 _STEPS = 60
+DESCENT = 200  # steps of a descent, at most
+FIRST_STEP = 1e-4  # s2, of it
+NEAR = 1e-3  # largest acceleration at its end (m/s2, rad/s2)
+FURTHEST = 5e-4  # m and rad, in one step
 
 
 @dataclass(frozen=True)
@@ -278,10 +284,45 @@ class _Balance:
         self.speed = speed
         self.work = work_arrays(system)
         self.residual = np.inf
+        self.rolling = rolling
         self._unknowns, self._equations, _ = conditions(model, system, rolling=rolling)
 
     def solve(self, guess: Floats) -> Floats:
         """Return the balanced state; raise ModelError with the unbalanced components."""
+        try:
+            return self._by_newton(guess)
+        except ModelError:
+            if self.rolling or (settled := self._descended(guess)) is None:
+                raise
+        return self._by_newton(settled)
+
+    def _descended(self, guess: Floats) -> Floats | None:
+        """Follow x' = a(x), whose forces without friction have a potential, down to its minimum.
+
+        Where left and right wheels differ, the lateral force about the middle has next to no slope
+        and grows on the way to where it vanishes: steps of Newton's method lead anywhere. Implicit
+        Euler with steps that grow (pseudo-transient continuation, Kelley and Keyes 1998). None: it
+        does not come to rest.
+        """
+        state, step = guess.copy(), FIRST_STEP
+        bodies = self._unknowns < 6 * self.model.index.n_bodies
+        for _ in range(DESCENT):
+            rest = self._accelerations(state)
+            if np.max(np.abs(rest)) < NEAR:
+                return state
+            slopes = difference_quotients(self._accelerations, state, rest, self._unknowns, 1e-9)
+            change = least_squares(np.eye(len(rest)) / step - slopes, rest, 1e-13)
+            trial = state.copy()
+            trial[self._unknowns] += change
+            step *= 0.25
+            with suppress(ModelError):
+                self._accelerations(trial)
+                if np.max(np.abs(change[bodies])) < FURTHEST:
+                    state, step = trial, 8.0 * step
+        return None
+
+    def _by_newton(self, guess: Floats) -> Floats:
+        """Newton's method from a guess; raise ModelError with the unbalanced components."""
         state = guess.copy()
         state[SPEED], state[ARC_LENGTH] = self.speed, 0.0
         wheelsets, spins = self.system.contact.body, 6 * self.model.index.n_bodies + 4
