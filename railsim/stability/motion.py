@@ -17,12 +17,12 @@ from railsim.errors import ModelError
 from railsim.kernels.contact_columns import W_Y
 from railsim.kernels.state import TIME
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import TABLE, Drive, System
+from railsim.kernels.system import PARTS, TABLE, Drive, System
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import POSITION
 from railsim.linear.eigenmodes import Eigenmodes
 from railsim.linear.vehicle import LinearVehicle
-from railsim.model.time_step import SCHEMES, Stability, empty_recorder
+from railsim.model.time_step import SCHEMES, Stability, divide_strikes, empty_recorder
 from railsim.model.work import against_rails, work_arrays
 
 OUTPUT_RATE = 200.0  # 1/s
@@ -82,8 +82,8 @@ class Motion(Protocol):
 class VehicleMotion:
     """A vehicle on straight track, moved by the time loop of runs.
 
-    Steps in which a flange strikes are not divided as in runs: that takes twice the time and moves
-    no end of a branch by 0.1 m/s.
+    Steps in which a flange strikes are divided as in runs only where the vehicle leaves the range
+    of the model without: that takes twice the time and moves no end of a branch by 0.1 m/s.
 
     `prepared`: on straight track; `scheme`: integration scheme, ``fast`` or ``rk4``; `mode`: one
     mode, in the shape of which the vehicle is disturbed: where all wheelsets are displaced alike,
@@ -130,6 +130,17 @@ class VehicleMotion:
 
     def stretch(self, state: Floats, begin: float, end: float, duration: float) -> Stretch:
         """Move for `duration` [s] while the speed goes evenly from `begin` to `end` [m/s]."""
+        try:
+            return self._stretch(state, begin, end, duration)
+        except LeftRange:  # a long step over a strike may throw a wheelset off its rails
+            step = self.step_at(max(begin, end))
+            divide_strikes(self.system, self._work, SCHEMES[self.scheme], step, max(begin, end))
+            try:
+                return self._stretch(state, begin, end, duration)
+            finally:
+                self._work.parts[PARTS] = 0
+
+    def _stretch(self, state: Floats, begin: float, end: float, duration: float) -> Stretch:
         parts: list[Stretch] = []
         done = 0.0
         while done < duration - 1e-9:

@@ -14,6 +14,7 @@ import railsim
 from railsim.contact import contact_geometry
 from railsim.errors import ModelError
 from railsim.kernels.support import LEARNT
+from railsim.kernels.system import PARTS
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.modes import modes
 from railsim.linear.stability_loss import LossOfStability, loss_of_stability
@@ -1050,6 +1051,32 @@ def test_a_stretch_passes_from_one_speed_to_the_other_on_the_way_of_their_mean()
     assert ways == pytest.approx([39.0 * motion_of.LONGEST, 37.5 * 0.5 * motion_of.LONGEST])
     assert begun == [(1, 40.0), (0, 38.0)]  # without memory at first
     assert np.diff(seen.time) == pytest.approx(np.full(len(seen.time) - 1, 1.0 / OUTPUT_RATE))
+
+
+@pytest.mark.parametrize("stays", [True, False])
+def test_what_leaves_the_rails_in_long_steps_is_looked_at_in_divided_ones(monkeypatch, stays):
+    """From the beginning: the state just before may be wrong already. Then long ones are back."""
+    motion, begun = object.__new__(motion_of.VehicleMotion), []
+
+    def stretch(state, begin, end, duration):
+        begun.append((state, int(motion._work.parts[PARTS])))
+        if not (stays and begun[-1][1]):
+            raise LeftRange("rolled over")
+        return "on the rails"
+
+    def divide(system, work, scheme, step, speed):
+        work.parts[PARTS] = 10
+
+    monkeypatch.setattr(motion_of, "divide_strikes", divide)
+    motion._work, motion.system = SimpleNamespace(parts=np.zeros(6, dtype=np.int64)), None
+    motion.scheme, motion.step_at, motion._stretch = "fast", lambda speed: 1e-3, stretch
+    if stays:
+        assert motion.stretch(1.0, 40.0, 37.0, 10.0) == "on the rails"
+    else:
+        with pytest.raises(LeftRange, match="rolled over"):
+            motion.stretch(1.0, 40.0, 37.0, 10.0)
+    assert begun == [(1.0, 0), (1.0, 10)]
+    assert not motion._work.parts[PARTS]
 
 
 def test_rest_is_not_called_stable_where_hunting_is_named_after_the_body():
