@@ -3,13 +3,11 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from numbers import Integral, Real
 
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.limits import Situation
 from railsim.definitions.loading import load_running_limits, load_track
@@ -28,8 +26,21 @@ from railsim.stability.branches import RESOLUTION, Branch, Point, first_beyond, 
 from railsim.stability.continuation import followed_branches
 from railsim.stability.diagram import diagram, speeds_about, unresolved
 from railsim.stability.motion import LeftRange, VehicleMotion
-from railsim.stability.ramp import EXCITATIONS, SMALL, Progress, below, ramp, tops_above
-from railsim.stability.result import Conicity, CriticalSpeed, LinearLoss, OverAmplitude
+from railsim.stability.ramp import (
+    EXCITATIONS,
+    SMALL,
+    Progress,
+    below,
+    lasts_in_shorter_steps,
+    ramp,
+    tops_above,
+)
+from railsim.stability.result import (
+    CriticalSpeed,
+    LinearLoss,
+    OverAmplitude,
+    conicity_over_amplitude,
+)
 from railsim.units import speed_in_si
 
 METHODS = ("linear", "ramp", "bifurcation", "continuation")
@@ -42,7 +53,6 @@ SLIDING = 0.03
 AGAIN = 1.25  # ratio of speeds at which is looked whether rest is stable again
 NO_FRICTION = "the friction is 0: without creep forces there is no hunting, and none is sought"
 AMPLITUDES = (0.1e-3, 0.2e-3, 0.3e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3)  # m
-OF_CONICITY = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
 
 
 def critical_speed(
@@ -110,7 +120,7 @@ def critical_speed(
     smooth = prepared(law, contact)
     found = CriticalSpeed(contact, vehicle.name_with_load, conditions(track, settings), low, high)
     found.remarks += smooth.remarks
-    found.conicity_over_amplitude = _conicity(smooth)
+    found.conicity_over_amplitude = conicity_over_amplitude(smooth)
     found.linear, stuck = _linear(found, smooth)
     tell = progress or (lambda _: None)
     tell(0.02)
@@ -145,16 +155,24 @@ def critical_speed(
         def share(fraction: float, number: int = number) -> None:
             tell(0.05 + 0.95 * (number + fraction) / len(wanted))
 
-        try:
-            if method == "ramp":
-                _by_ramp(found, motion, begins, stuck, excitations, share)
-            elif method == "bifurcation":
-                unstable = [v for v in (stuck, begins.parameter) if v is not None]
-                _by_diagram(found, motion, unstable, points, excitations, share)
-            else:
-                _by_continuation(found, motion, begins, share)
-        except (LeftRange, ModelError) as error:
-            found.remarks.append(f"{method}: {error}")
+        def search(motion: VehicleMotion, method: str = method, share: Progress = share) -> None:
+            try:
+                if method == "ramp":
+                    _by_ramp(found, motion, begins, stuck, excitations, share)
+                elif method == "bifurcation":
+                    unstable = [v for v in (stuck, begins.parameter) if v is not None]
+                    _by_diagram(found, motion, unstable, points, excitations, share)
+                else:
+                    _by_continuation(found, motion, begins, share)
+            except (LeftRange, ModelError) as error:
+                found.remarks.append(f"{method}: {error}")
+
+        before = len(found.branches), len(found.remarks)
+        search(motion)
+        slowest = found.nonlinear.get(method)
+        if slowest and method != "continuation" and not lasts_in_shorter_steps(motion, slowest):
+            del found.branches[before[0] :], found.remarks[before[1] :], found.nonlinear[method]
+            search(motion.in_shorter_steps())
     _conclude(found, vehicle, of_runs, begins)
     _remark_range(found, vehicle)
     return found
@@ -293,25 +311,6 @@ def _over_amplitude(prepared: LinearVehicle, low: float, high: float) -> OverAmp
         found.speed.append(low if lost.already else lost.parameter)
         found.frequency.append(float(critical.frequencies[0]) if critical else None)
     return found
-
-
-def _conicity(prepared: LinearVehicle) -> Conicity | None:
-    """Equivalent conicity of the leading wheelset at the amplitudes that its profiles allow.
-
-    Where it falls with the amplitude below 3 mm, small limit cycles come first (Polach 2006).
-    """
-    body = prepared.model.flat.of_kind("wheelset")[0]
-    assert body.wheelset is not None
-    if (geometry := geometry_of(body.wheelset, prepared.track, prepared.model.profiles)) is None:
-        return None
-    values = _conicities(geometry)
-    known = np.isfinite(values)
-    return Conicity(body.name, OF_CONICITY[known].tolist(), values[known].tolist())
-
-
-@lru_cache(8)  # maps and optimisations ask for the same geometry over and over
-def _conicities(geometry: ContactGeometry) -> Floats:
-    return geometry.equivalent_conicity(OF_CONICITY)
 
 
 def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:

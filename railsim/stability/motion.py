@@ -27,6 +27,7 @@ from railsim.model.work import against_rails, work_arrays
 
 OUTPUT_RATE = 200.0  # 1/s
 LONGEST = 1.0  # s of a stretch that the table of the track holds
+SHORTER = 4  # parts of a step, to see whether its length matters
 SPEED_CLASS = 1.25  # ratio of the speeds that share a time step
 
 
@@ -94,6 +95,7 @@ class VehicleMotion:
         self.prepared, self.model, self.system = prepared, prepared.model, prepared.system
         self.scheme = scheme
         self._steps: dict[int, float] = {}
+        self._parts = 1
         self._allocate()
         names, known = prepared.coordinates.names, mode.linearisation.names
         self._disturbed = prepared.coordinates.indices[[names.index(name) for name in known]]
@@ -112,6 +114,12 @@ class VehicleMotion:
         other._allocate()
         return other
 
+    def in_shorter_steps(self) -> "VehicleMotion":
+        """Return the same vehicle in shorter steps, with arrays of its own."""
+        other = self.beside()
+        other._parts = SHORTER * self._parts
+        return other
+
     def step_at(self, speed: float) -> float:
         """Time step at a speed: the shorter one of those at both ends of its class [s]."""
         number = math.floor(math.log(speed) / math.log(SPEED_CLASS) + 1e-9)
@@ -119,7 +127,7 @@ class VehicleMotion:
             if end not in self._steps:
                 of = self.model, self.system, self.prepared.steady(SPEED_CLASS**end), self.scheme
                 self._steps[end] = Stability(*of, lambda _: ()).choose(1.0 / OUTPUT_RATE)
-        return min(self._steps[number], self._steps[number + 1])
+        return min(self._steps[number], self._steps[number + 1]) / self._parts
 
     def rest(self, speed: float, amplitude: float) -> Floats:
         """State of steady rolling with a disturbance that moves a wheelset by `amplitude` [m]."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.stability.branches import RESOLUTION, THRESHOLD, Branch, Point, seen_at
-from railsim.stability.motion import LeftRange, Motion, Stretch
+from railsim.stability.motion import LeftRange, Motion, Stretch, VehicleMotion
 
 Progress = Callable[[float], None]
 
@@ -37,6 +37,7 @@ ONWARDS, ABOVE = (0.5, 0.1), 0.1
 # Ratios of speeds at which other motions are sought below the slowest one: two that differ little,
 # such as on the flange with 6.5 and 6.7 mm, may end 7 % apart.
 CLOSE, BELOW = 0.95, 0.8
+ABOVE_END = 0.5  # m/s, by which the end of a branch may move with the step
 
 
 def excited(motion: Motion, speed: float, amplitude: float) -> Stretch:
@@ -216,3 +217,17 @@ def sustained(motion: Motion, state: Floats, speed: float) -> Point | None:
             return seen_at(speed, seen)
         before, state = seen.amplitude, seen.state
     return None
+
+
+def lasts_in_shorter_steps(motion: VehicleMotion, found: Point) -> bool:
+    """Whether a motion lasts in shorter steps, at its speed or, at the end of its branch, above.
+
+    At walking pace and in steps as long as the tread allows, creep forces on a flange alternate
+    from step to step and may hold a wheelset there that would leave it.
+    """
+    finer = motion.in_shorter_steps()
+    for speed in (found.speed, found.speed + ABOVE_END):
+        with suppress(LeftRange):
+            if sustained(finer, moved(finer, found.state, found.speed, speed), speed):
+                return True
+    return False

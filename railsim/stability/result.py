@@ -3,16 +3,20 @@
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from railsim.arrays import Floats
+from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.errors import optional_package
-from railsim.linear.vehicle import Contact
+from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.plottable import Plottable
 from railsim.stability.branches import COLUMNS, Branch, Jump, Limit, Point
 from railsim.table import Column, Table
 
+OF_CONICITY = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
 TABLE = (
     Column("critical speed"),
     Column("speed", unit="m/s", format=".2f"),
@@ -233,3 +237,22 @@ class CriticalSpeed(Plottable):
         if self.onset and self.onset != self.type:
             words += f"; small motions begin as in a {self.onset} one"
         return words
+
+
+def conicity_over_amplitude(prepared: LinearVehicle) -> Conicity | None:
+    """Equivalent conicity of the leading wheelset at the amplitudes that its profiles allow.
+
+    Where it falls with the amplitude below 3 mm, small limit cycles come first (Polach 2006).
+    """
+    body = prepared.model.flat.of_kind("wheelset")[0]
+    assert body.wheelset is not None
+    if (geometry := geometry_of(body.wheelset, prepared.track, prepared.model.profiles)) is None:
+        return None
+    values = _conicities(geometry)
+    known = np.isfinite(values)
+    return Conicity(body.name, OF_CONICITY[known].tolist(), values[known].tolist())
+
+
+@lru_cache(8)  # maps and optimisations ask for the same geometry over and over
+def _conicities(geometry: ContactGeometry) -> Floats:
+    return geometry.equivalent_conicity(OF_CONICITY)

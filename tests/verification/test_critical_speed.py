@@ -28,7 +28,6 @@ from railsim.stability import motion as motion_of
 from railsim.stability.branches import THRESHOLD, Branch, Limit, Point, first_beyond, lowest_of
 from railsim.stability.continuation import settled_to
 from railsim.stability.critical_speed import (
-    OF_CONICITY,
     _by_continuation,
     _by_ramp,
     _remark_range,
@@ -36,8 +35,8 @@ from railsim.stability.critical_speed import (
 )
 from railsim.stability.diagram import diagram, speeds_about, unresolved
 from railsim.stability.motion import OUTPUT_RATE, LeftRange, Stretch
-from railsim.stability.ramp import ramp, sustained
-from railsim.stability.result import Conicity, CriticalSpeed, OverAmplitude
+from railsim.stability.ramp import lasts_in_shorter_steps, ramp, sustained
+from railsim.stability.result import OF_CONICITY, Conicity, CriticalSpeed, OverAmplitude
 from railsim.stability.vehicle_flow import VehicleFlow
 
 CRITICAL = railsim.stability.critical_speed
@@ -1026,7 +1025,7 @@ def test_the_step_at_a_speed_that_two_classes_share_is_judged_once(monkeypatch):
     motion = object.__new__(motion_of.VehicleMotion)
     motion.prepared = SimpleNamespace(steady=lambda speed: speed)
     motion.model = motion.system = motion.scheme = None
-    motion._steps = {}
+    motion._steps, motion._parts = {}, 1
     assert motion.step_at(1.25**17.5) == motion.step_at(1.25**16.5) == 1e-3
     assert judged == [17, 18, 16]
 
@@ -1051,6 +1050,49 @@ def test_a_stretch_passes_from_one_speed_to_the_other_on_the_way_of_their_mean()
     assert ways == pytest.approx([39.0 * motion_of.LONGEST, 37.5 * 0.5 * motion_of.LONGEST])
     assert begun == [(1, 40.0), (0, 38.0)]  # without memory at first
     assert np.diff(seen.time) == pytest.approx(np.full(len(seen.time) - 1, 1.0 / OUTPUT_RATE))
+
+
+class HeldByTheStep:
+    """Hunts with 1 mm at 2 Hz above a speed that depends on the step, and dies below it."""
+
+    def __init__(self, ends, in_shorter_steps):
+        self.ends, self.finer = ends, in_shorter_steps
+
+    def in_shorter_steps(self):
+        return HeldByTheStep(self.finer, self.finer)
+
+    def stretch(self, state, begin, end, duration):
+        time = np.arange(0.0, duration, 1.0 / OUTPUT_RATE)
+        size = 1e-3 if end >= self.ends else 0.0
+        lateral = (size * np.sin(4.0 * np.pi * time))[:, None]
+        return Stretch(state, time, lateral, np.zeros_like(lateral))
+
+
+@pytest.mark.parametrize(("finer", "lasts"), [(20.0, True), (20.3, True), (40.0, False)])
+def test_what_a_long_step_holds_is_told_from_a_motion_whose_end_moves_with_it(finer, lasts):
+    motion = HeldByTheStep(20.0, finer)
+    found = sustained(motion, np.zeros(1), 20.0)
+    assert found.hunts
+    assert lasts_in_shorter_steps(motion, found) is lasts
+
+
+def test_a_method_whose_slowest_motion_is_one_of_the_step_is_repeated_in_shorter_ones(monkeypatch):
+    """Coach, friction 0.4 and 0.1: in steps of 2.5 ms a bogie stayed on its flange to 5 m/s."""
+    tried, short = [], object()
+
+    def by_ramp(found, motion, *_):
+        tried.append(motion)
+        found.branches.append(Branch("ramp"))
+        found.nonlinear["ramp"] = Point(44.2 if motion is short else 5.0, 1e-3, 2.5)
+
+    motion = SimpleNamespace(in_shorter_steps=lambda: short)
+    monkeypatch.setattr(CRITICAL, "VehicleMotion", lambda *_: motion)
+    monkeypatch.setattr(CRITICAL, "_by_ramp", by_ramp)
+    monkeypatch.setattr(CRITICAL, "lasts_in_shorter_steps", lambda motion, _: motion is short)
+    coach, law = load_vehicle("coach_manchester"), railsim.Settings(creep_law="polach")
+    found = critical_speed(coach, RIGID, over_amplitude=False, settings=law)
+    assert tried == [motion, short]
+    assert (found.lowest.speed, len(found.branches)) == (44.2, 1)
 
 
 @pytest.mark.parametrize("stays", [True, False])
