@@ -270,9 +270,10 @@ def _linear(
                 f"{mode.linearisation.parameter:.4g} m/s or less as long as all friction elements "
                 "stick; sliding limits it, so that it does not count as loss of stability"
             )
+    if lost.already or lost.parameter is not None:
+        found.remarks += _stable_again(prepared, lost.parameter or low, high)
     if lost.parameter is not None:
         mode = lost.modes[0]
-        found.remarks += _stable_again(prepared, lost.parameter, high)
         frequency = float(mode.frequencies[0])
         return LinearLoss(lost.parameter, frequency, mode_name(parts, mode)), stuck
     found.unstable_at_low = lost.already

@@ -722,6 +722,10 @@ def test_a_vehicle_that_is_unstable_in_a_range_only_is_said_so():
     found = critical_speed(coach, RIGID, methods=("linear",), over_amplitude=False)
     assert found.linear.speed == pytest.approx(17.0, abs=0.2)
     (remark,) = [words for words in found.remarks if "no longer" in words]
+    already = critical_speed(coach, RIGID, methods=("linear",), low=20.0, over_amplitude=False)
+    assert already.unstable_at_low
+    (again,) = [words for words in already.remarks if "no longer" in words]
+    assert again.split(" on, ")[1] == remark.split(" on, ")[1]
     border, loss = map(float, re.findall(r"(?:above|to) (\d+\.?\d*) m/s", remark))
     for speed, stable in ((border - 0.1, False), (border + 0.1, True), (loss - 0.1, True),
                           (loss + 0.1, False)):  # fmt: skip
