@@ -5,9 +5,10 @@ Three steps, each on straight level track:
 1. preloads marked `auto` are solved so that every sprung body is in equilibrium in its nominal
    position; where there are more springs than conditions, all deflect alike as far as they can
    (least sum of F^2/k);
-2. without friction, Newton's method finds the position at rest, if need be after a descent from
-   the nominal one; its wheel forces are Q0;
+2. without friction, Newton's method finds the position at rest; its wheel forces are Q0;
 3. with friction and speed, it finds the steady rolling: positions and the spin of the wheelsets.
+
+Where Newton's method fails in 2 or 3 it begins again where the accelerations lead.
 
 A fixed body is first let down on its springs like any other, and held where it then stands; where
 it cannot stand by itself it is held in its nominal position.
@@ -284,27 +285,34 @@ class _Balance:
         self.speed = speed
         self.work = work_arrays(system)
         self.residual = np.inf
-        self.rolling = rolling
         self._unknowns, self._equations, _ = conditions(model, system, rolling=rolling)
 
     def solve(self, guess: Floats) -> Floats:
         """Return the balanced state; raise ModelError with the unbalanced components."""
+        state = guess.copy()
+        state[SPEED], state[ARC_LENGTH] = self.speed, 0.0
+        wheelsets, spins = self.system.contact.body, 6 * self.model.index.n_bodies + 4
+        self._accelerations(state)
+        # Rolling without slip where the wheels touch: creep forces near mu N have next to no slopes
+        lever, nominal = self.work.wheel[:, :, W_C_Z], self.system.bodies.radius[wheelsets, None]
+        radius = np.where(lever > 0.0, lever, nominal).mean(axis=1)
+        state[spins + 6 * wheelsets] = -self.speed / radius
         try:
-            return self._by_newton(guess)
+            return self._by_newton(state)
         except ModelError:
-            if self.rolling or (settled := self._descended(guess)) is None:
+            if (settled := self._descended(state)) is None:
                 raise
         return self._by_newton(settled)
 
-    def _descended(self, guess: Floats) -> Floats | None:
-        """Follow x' = a(x), whose forces without friction have a potential, down to its minimum.
+    def _descended(self, state: Floats) -> Floats | None:
+        """Follow x' = a(x): without friction to a minimum of the potential, with it as steered.
 
-        Where left and right wheels differ, the lateral force about the middle has next to no slope
-        and grows on the way to where it vanishes: steps of Newton's method lead anywhere. Implicit
-        Euler with steps that grow (pseudo-transient continuation, Kelley and Keyes 1998). None: it
-        does not come to rest.
+        Where left and right wheels differ, the forces about the middle have next to no slopes and
+        grow on the way to where they vanish: steps of Newton's method lead anywhere. Implicit Euler
+        with steps that grow (pseudo-transient continuation, Kelley and Keyes 1998). None: it does
+        not come to rest.
         """
-        state, step = guess.copy(), FIRST_STEP
+        step = FIRST_STEP
         bodies = self._unknowns < 6 * self.model.index.n_bodies
         for _ in range(DESCENT):
             rest = self._accelerations(state)
@@ -321,16 +329,8 @@ class _Balance:
                     state, step = trial, 8.0 * step
         return None
 
-    def _by_newton(self, guess: Floats) -> Floats:
+    def _by_newton(self, state: Floats) -> Floats:
         """Newton's method from a guess; raise ModelError with the unbalanced components."""
-        state = guess.copy()
-        state[SPEED], state[ARC_LENGTH] = self.speed, 0.0
-        wheelsets, spins = self.system.contact.body, 6 * self.model.index.n_bodies + 4
-        self._accelerations(state)
-        # Rolling without slip where the wheels touch: creep forces near mu N have next to no slopes
-        lever, nominal = self.work.wheel[:, :, W_C_Z], self.system.bodies.radius[wheelsets, None]
-        radius = np.where(lever > 0.0, lever, nominal).mean(axis=1)
-        state[spins + 6 * wheelsets] = -self.speed / radius
         rest = self._accelerations(state)
         change = np.zeros(len(self._unknowns))
         for _ in range(_STEPS):

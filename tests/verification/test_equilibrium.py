@@ -183,3 +183,19 @@ def test_wheels_of_unequal_wear_stand_where_their_wheelset_is_lowest(worn):
     standing = _at_rest(model).state[6 * model.system.contact.body + 1]
     np.testing.assert_allclose(standing, lateral[np.argmax(geometry.centre_z)], atol=0.3e-3)
     assert found.Q0.sum() == pytest.approx(model.system.bodies.mass.sum() * GRAVITY)
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+def test_wheels_of_unequal_wear_roll_where_their_radii_are_equal():
+    """They stand on the other side of the middle: on the way both steer with next to no slope."""
+    worn = hollow_wheel(0.5e-3)
+    worn = replace(worn, z=worn.z - np.interp(0.0, worn.y, worn.z))  # of the nominal radius
+    text = WAGON.replace('profile = "S1002"', 'profile = ["worn", "S1002"]\nback_to_back = 1.353')
+    track = load_track("straight").replace(support={"preset": "rigid"})
+    found = equilibrium(assemble(load_vehicle_text(text), track, Settings(), {"worn": worn}), 1.0)
+    lateral = np.arange(1e-3, 6e-3, 5e-5)
+    wheels, rail = (worn, load_profile("S1002")), load_profile("60E1")
+    geometry = contact_geometry(wheels, rail, back_to_back=1.353, lateral=lateral)
+    rolling = found.state[6 * found.model.system.contact.body + 1]
+    equal = np.interp(0.0, geometry.delta_r, lateral)
+    np.testing.assert_allclose(rolling, equal, atol=0.3e-3)
