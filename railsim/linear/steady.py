@@ -9,7 +9,7 @@ Newton's method on forces and moments, with differences, a line search, and a le
 where the matrix is nearly singular.  The normal force has a potential and creep forces are
 continuous, hence contact patches come and go without any logic of switching.  Where the way is too
 far, it is gone in parts: the curvature, cant, friction and square of the speed are led from a known
-state to the one sought, and steps that fail are halved.
+state to the one sought, and steps that fail are halved; beyond the smallest the accelerations lead.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from railsim.kernels.status import RUNNING
 from railsim.kernels.system import AXLEBOX, WHEELSET, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.model.assembly import Model
-from railsim.model.equilibrium import conditions, difference_quotients
+from railsim.model.equilibrium import conditions, difference_quotients, settled
 from railsim.model.work import CONSTANT_SPEED, work_arrays
 
 RESIDUAL = 1e-7  # largest acceleration left (m/s2, rad/s2)
@@ -81,6 +81,21 @@ class SteadyRolling:
             words = self.model.index.largest_left(self._equations, left, 3)
             raise NotConverged(f"no steady state; {words}")
         return state
+
+    def settled(self, guess: Floats, speed: float) -> Floats:
+        """As `solve`, at first where the accelerations lead from a guess: past a kink of a force.
+
+        Raises NotConverged: they lead nowhere.
+        """
+
+        def accelerations(states: Floats) -> Floats:
+            return self._forces(states) / self._inertias
+
+        near = self._unknowns < 6 * self.model.index.n_bodies
+        found = settled(accelerations, self.prepared(guess, speed), self._unknowns, near)
+        if found is None:
+            raise NotConverged("no steady state")
+        return self.solve(found, speed)
 
     def evaluate(self, state: Floats) -> Floats:
         """Derivative of a state, forces into `work`; NotConverged: the state is out of range."""
@@ -193,7 +208,11 @@ def led(
         else:
             step *= 0.5
             if step < smallest:
-                raise NotConverged(f"{reason} ({100.0 * done:.0f} % of the way)")
+                try:
+                    now = before = solver.settled(now, speed)
+                except NotConverged:
+                    raise NotConverged(f"{reason} ({100.0 * done:.0f} % of the way)") from None
+                done, step = share, smallest
             continue
         before, length = now, share - done
         now, done = found, share

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from railsim.arrays import Floats, Indices
+from railsim.arrays import Flags, Floats, Indices
 from railsim.errors import ModelError
 from railsim.kernels import support as rails
 from railsim.kernels.contact_columns import NORMAL, W_C_Z, W_Q
@@ -46,7 +46,7 @@ from railsim.notation import ROLL, SIDES, YAW, Z
 RESIDUAL = 1e-7  # largest acceleration left in equilibrium (m/s2, rad/s2)
 ONE_SIDED = 0.01  # least friction of a rail in the balance, as a share of the other's
 _STEPS = 60
-DESCENT = 200  # steps of a descent, at most
+DESCENT = 300  # steps of a descent, at most
 FIRST_STEP = 1e-4  # s2, of it
 NEAR = 1e-3  # largest acceleration at its end (m/s2, rad/s2)
 FURTHEST = 5e-4  # m and rad, in one step
@@ -276,6 +276,33 @@ def difference_quotients(
     return np.asarray(((function(trials) - value) / steps[:, None]).T)
 
 
+def settled(
+    accelerations: Callable[[Floats], Floats], state: Floats, unknowns: Indices, limited: Flags
+) -> Floats | None:
+    """Follow x' = a(x): without friction to a minimum of the potential, with it as steered.
+
+    Where left and right wheels differ, the forces about the middle have next to no slopes and grow
+    on the way to where they vanish: steps of Newton's method lead anywhere. Implicit Euler with
+    steps that grow (pseudo-transient continuation, Kelley and Keyes 1998). `limited`: unknowns of
+    which each step changes little, positions. None: it does not come to rest.
+    """
+    step = FIRST_STEP
+    for _ in range(DESCENT):
+        rest = accelerations(state)
+        if np.max(np.abs(rest)) < NEAR:
+            return state
+        slopes = difference_quotients(accelerations, state, rest, unknowns, 1e-9)
+        change = least_squares(np.eye(len(rest)) / step - slopes, rest, 1e-13)
+        trial = state.copy()
+        trial[unknowns] += change
+        step *= 0.25
+        with suppress(ModelError):
+            accelerations(trial)
+            if np.max(np.abs(change[limited])) < FURTHEST:
+                state, step = trial, 8.0 * step
+    return None
+
+
 class _Balance:
     """Newton's method on the accelerations of all bodies, velocities zero in the track frame."""
 
@@ -300,34 +327,10 @@ class _Balance:
         try:
             return self._by_newton(state)
         except ModelError:
-            if (settled := self._descended(state)) is None:
+            near = self._unknowns < 6 * self.model.index.n_bodies
+            if (found := settled(self._accelerations, state, self._unknowns, near)) is None:
                 raise
-        return self._by_newton(settled)
-
-    def _descended(self, state: Floats) -> Floats | None:
-        """Follow x' = a(x): without friction to a minimum of the potential, with it as steered.
-
-        Where left and right wheels differ, the forces about the middle have next to no slopes and
-        grow on the way to where they vanish: steps of Newton's method lead anywhere. Implicit Euler
-        with steps that grow (pseudo-transient continuation, Kelley and Keyes 1998). None: it does
-        not come to rest.
-        """
-        step = FIRST_STEP
-        bodies = self._unknowns < 6 * self.model.index.n_bodies
-        for _ in range(DESCENT):
-            rest = self._accelerations(state)
-            if np.max(np.abs(rest)) < NEAR:
-                return state
-            slopes = difference_quotients(self._accelerations, state, rest, self._unknowns, 1e-9)
-            change = least_squares(np.eye(len(rest)) / step - slopes, rest, 1e-13)
-            trial = state.copy()
-            trial[self._unknowns] += change
-            step *= 0.25
-            with suppress(ModelError):
-                self._accelerations(trial)
-                if np.max(np.abs(change[bodies])) < FURTHEST:
-                    state, step = trial, 8.0 * step
-        return None
+        return self._by_newton(found)
 
     def _by_newton(self, state: Floats) -> Floats:
         """Newton's method from a guess; raise ModelError with the unbalanced components."""

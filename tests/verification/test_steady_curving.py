@@ -485,3 +485,14 @@ def test_bodies_turn_with_their_track_frames():
         u = 20.0 * C.T @ w[model.system.bodies.frame[b]]
         u[1] = before[b, 1] if spins else u[1]
         np.testing.assert_allclose(after[b], u, atol=1e-12)
+
+
+def test_a_way_on_which_a_flange_touches_is_passed_where_accelerations_lead():
+    """There slopes change at once: Newton's method stopped at 89 %, and a run had to be taken."""
+    key = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.radius"
+    coach = load_vehicle("coach_manchester", [f"{key}=[0.4598, 0.4602]"])
+    track = load_track("straight").replace(friction=[0.3, 0.1])
+    found = railsim.curving(coach, track, radius=2000.0, cant=0.0, cant_deficiency=0.11)
+    assert found.converged.item() == 1
+    held = -(43628.0 + 2.0 * 2615.0 + 4.0 * 1813.0) * GRAVITY * 0.11 / 1.5
+    assert found.sum_Y.sum() == pytest.approx(held, rel=1e-3)
