@@ -141,9 +141,9 @@ class Evaluation:
 def _written_value(variable: Variable, share: float) -> str:
     """Return the value at a share of a variable's range as text, within the range.
 
-    >>> _written(Variable(low=1e3, high=1e5, scale="log"), 0.5)
+    >>> _written_value(Variable(low=1e3, high=1e5, scale="log"), 0.5)
     '10000'
-    >>> [_written(Variable(low=1234567.8, high=1234569.0), share) for share in (0.0, 0.5)]
+    >>> [_written_value(Variable(low=1234567.8, high=1234569.0), share) for share in (0.0, 0.5)]
     ['1234567.8', '1234568.4']
     """
     if variable.scale == "log":

@@ -187,7 +187,7 @@ def test_signal_is_obeyed_while_python_cannot(tmp_path):
         "import railsim.cli.interrupts as interrupts; from railsim.files.access import PartialFile;"
         "interrupts.PATIENCE = 0.5;"
         "partial = PartialFile(Path(sys.argv[1]));"
-        "cli._called = lambda _: print('begun', flush=True)"
+        "cli._call = lambda _: print('begun', flush=True)"
         " or hashlib.pbkdf2_hmac('sha256', b'', b'', 10**9);"
         "sys.exit(cli.main([]))"
     )
@@ -215,7 +215,7 @@ def test_end_that_hangs_is_ended_and_a_second_signal_does_not_disturb_it():
         "import atexit, sys, time; import railsim.cli as cli;"
         "import railsim.cli.interrupts as interrupts; interrupts.PATIENCE = 2.0;"
         "atexit.register(time.sleep, 600);"
-        "cli._called = lambda _: print('begun', flush=True) or time.sleep(600);"
+        "cli._call = lambda _: print('begun', flush=True) or time.sleep(600);"
         "sys.exit(cli.main())"
     )
     process = subprocess.Popen(

@@ -105,8 +105,13 @@ class Steps:
         monkeypatch.setattr("railsim.linear.steady.SteadyRolling", self)
 
     def __call__(self, model, share):
+        def settled(guess, speed):
+            raise NotConverged("no steady state")  # accelerations lead nowhere
+
         return SimpleNamespace(
-            solve=lambda guess, speed: self.solve(share, guess, speed), evaluate=lambda state: None
+            solve=lambda guess, speed: self.solve(share, guess, speed),
+            settled=settled,
+            evaluate=lambda state: None,
         )
 
     def solve(self, share, guess, speed):
