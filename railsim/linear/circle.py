@@ -14,7 +14,7 @@ LENGTH = 50.0  # m; the tables reach beyond both ends
 POSITION = 25.0  # m, where a vehicle stands on it
 
 
-def placed(state: Floats) -> Floats:
+def at_middle(state: Floats) -> Floats:
     """Return a state of the vehicle standing there."""
     found = state.copy()
     found[ARC_LENGTH] = POSITION

@@ -55,7 +55,7 @@ def closed_loop(
     which[:, acts.SLOTS] = 0  # commands arrive at once, their delay is that of the loop
     free.system = free.system._replace(actuators=free.system.actuators._replace(which=which))
     n = len(free.coordinates.names)
-    A, B = free.tangent(), _commanded(free)
+    A, B = free.tangent(), _rates_by_command(free)
     K, D, delay = _loop(prepared, free, vehicle, settings or Settings(), delays + step)
     m = B.shape[1]
     matrix = np.zeros((n + m, n + m))
@@ -74,7 +74,7 @@ def closed_loop(
     return Linearisation(names, without_forceless(matrix, w), state, speed)
 
 
-def _commanded(free: FreeVehicle) -> Floats:
+def _rates_by_command(free: FreeVehicle) -> Floats:
     """How the rates follow the commands: B, float64[n, m]."""
     where, memory = free.system.actuators.which[:, acts.COMMAND], free.work.memory
 
@@ -89,22 +89,22 @@ def _commanded(free: FreeVehicle) -> Floats:
 
 
 def _loop(
-    prepared: LinearVehicle, free: FreeVehicle, vehicle: Vehicle, settings: Settings, delay: Floats
+    linear: LinearVehicle, free: FreeVehicle, vehicle: Vehicle, settings: Settings, delay: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """What controllers give for a state: w = K x + D u, and its delays [s]."""
-    model = with_control(prepared.model, vehicle, settings)
+    model = with_control(linear.model, vehicle, settings)
     signals, controllers = model.system.signals, model.system.controllers
     plain, row = signals.which.copy(), signals.row.copy()
     plain[:, kernel.SLOTS] = 0
     row[:, [kernel.PERIOD, kernel.DELAY, kernel.NOISE, kernel.RESOLUTION]] = 0.0
-    system = prepared.system._replace(
+    system = linear.system._replace(
         actuators=free.system.actuators,
         signals=signals._replace(which=plain, row=row),
         controllers=controllers,
         own=model.system.own,
     )
     where = system.actuators.which[:, acts.COMMAND]
-    work, recorder = work_arrays(system), empty_recorder(prepared.model, 1)
+    work, recorder = work_arrays(system), empty_recorder(linear.model, 1)
 
     def given(x: Floats, u: Floats) -> Floats:
         """Commands for a state and commands before, by one call of the time loop."""

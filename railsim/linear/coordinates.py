@@ -218,9 +218,9 @@ class FreeVehicle:
 
     def evaluate(self, state: Floats) -> Floats:
         """Derivative of a whole state, forces left in `work`; ModelError: it is out of range."""
-        return np.asarray(self._evaluated(state[None], self.system)[0])
+        return np.asarray(self._derivatives(state[None], self.system)[0])
 
-    def _evaluated(self, states: Floats, system: System) -> Floats:
+    def _derivatives(self, states: Floats, system: System) -> Floats:
         derivatives = np.empty_like(states)
         status, where, _ = right_hand_sides(system, self.work, states, derivatives)
         if status != RUNNING:
@@ -236,7 +236,7 @@ class FreeVehicle:
         """Derivatives of the coordinates, float64[k, n] of as many; of another system if given."""
         trials = np.repeat(self.state[None], len(x), axis=0)
         trials[:, self.coordinates.indices] = x
-        derivatives = self._evaluated(trials, system or self.system)
+        derivatives = self._derivatives(trials, system or self.system)
         derivatives[:, self._reference[0]] = trials[:, self._reference[1]]
         of_velocities = slice(velocity_begin(self._n), internal_begin(self._n))
         velocities = derivatives[:, of_velocities].reshape(len(x), -1, 6)

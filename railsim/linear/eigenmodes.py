@@ -101,7 +101,7 @@ def oscillations(modes: Eigenmodes, most: float = np.inf) -> Eigenmodes:
     return modes.taken(np.flatnonzero(inside))
 
 
-def followed(at: At, parameters: Sequence[float], most: float = np.inf) -> list[Eigenmodes]:
+def follow_modes(at: At, parameters: Sequence[float], most: float = np.inf) -> list[Eigenmodes]:
     """Oscillations over a parameter, each mode at the same index throughout.
 
     Where the pairing of neighbours is not clear, linearisations between them are looked at.  An
@@ -123,7 +123,7 @@ def followed(at: At, parameters: Sequence[float], most: float = np.inf) -> list[
             [-1] * (number + 1) + [j] for j in range(len(after.eigenvalues)) if j not in known
         ]
     table = np.array(chains, dtype=int).reshape(-1, len(sets))
-    return [_ordered(modes, table[:, k]) for k, modes in enumerate(sets)]
+    return [_in_order(modes, table[:, k]) for k, modes in enumerate(sets)]
 
 
 def _partners(
@@ -153,7 +153,7 @@ def _partners(
     return {i: second[j] for i, j in first.items() if j in second}
 
 
-def _ordered(modes: Eigenmodes, indices: Indices) -> Eigenmodes:
+def _in_order(modes: Eigenmodes, indices: Indices) -> Eigenmodes:
     """Modes of given indices, NaN where there is none (-1)."""
     parts = (modes.eigenvalues, modes.shapes, modes.left)
     nothing = complex(np.nan, np.nan)  # behind the last one, where -1 points to

@@ -14,7 +14,7 @@ from railsim.arrays import Complexes
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
 from railsim.errors import argument_error, nearest, optional_package
-from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
+from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, follow_modes
 from railsim.linear.naming import apart, divergence, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
 from railsim.plottable import Plottable
@@ -319,9 +319,9 @@ def modes(
     """
     contact = Contact(linearisation, amplitude, conicity)
     where = {"radius": radius, "cant": cant, "held": held, "hold": hold}
-    prepared = _prepared(vehicle, track, contact, settings, profiles=profiles, **where)
+    prepared = _linear_vehicle(vehicle, track, contact, settings, profiles=profiles, **where)
     (speed,) = checked_speeds([speed])
-    return _named(prepared, eigenmodes(prepared.linearised(speed)), speed)
+    return _with_names(prepared, eigenmodes(prepared.linearised(speed)), speed)
 
 
 def root_locus(
@@ -342,13 +342,13 @@ def root_locus(
     speeds = checked_speeds(speeds, "speeds")
     names = ("linearisation", "amplitude", "conicity")
     contact = Contact(**{name: how.pop(name) for name in names if name in how})
-    prepared = _prepared(vehicle, track, contact, **how)
-    sets = followed(prepared.linearised, speeds, FOLLOWED)
-    named = [_named(prepared, found, speed) for found, speed in zip(sets, speeds, strict=True)]
+    prepared = _linear_vehicle(vehicle, track, contact, **how)
+    sets = follow_modes(prepared.linearised, speeds, FOLLOWED)
+    named = [_with_names(prepared, found, speed) for found, speed in zip(sets, speeds, strict=True)]
     return RootLocus("speed", tuple(speeds), tuple(named), "m/s")
 
 
-def _prepared(
+def _linear_vehicle(
     vehicle: Vehicle,
     track: Track | None,
     contact: Contact,
@@ -360,7 +360,7 @@ def _prepared(
 
 
 def parameter_locus(
-    prepared: Callable[[float], LinearVehicle],
+    linear_vehicle: Callable[[float], LinearVehicle],
     key: str,
     values: Sequence[float],
     speed: float,
@@ -371,10 +371,10 @@ def parameter_locus(
     `prepared`: value of the parameter to the vehicle.
     """
     (speed,) = checked_speeds([speed])
-    of = cache(prepared)
-    sets = followed(lambda value: of(value).linearised(speed), list(values), FOLLOWED)
+    of = cache(linear_vehicle)
+    sets = follow_modes(lambda value: of(value).linearised(speed), list(values), FOLLOWED)
     each = zip(sets, values, strict=True)
-    named = [_named(of(value), found, speed, (key, value)) for found, value in each]
+    named = [_with_names(of(value), found, speed, (key, value)) for found, value in each]
     return RootLocus(key, tuple(values), tuple(named), unit)
 
 
@@ -391,13 +391,13 @@ def checked_speeds(speeds: Sequence[float | str], name: str = "speed") -> list[f
     return [float(value) for value in values]
 
 
-def _named(
-    prepared: LinearVehicle,
+def _with_names(
+    linear: LinearVehicle,
     found: Eigenmodes,
     speed: float,
     parameter: tuple[str, float] | None = None,
 ) -> Modes:
-    c, parts = prepared.coordinates, parts_of(prepared.model, prepared.coordinates)
+    c, parts = linear.coordinates, parts_of(linear.model, linear.coordinates)
     found = apart(parts, found)
     there = ~np.isnan(found.eigenvalues)
     # oscillations are numbered before the modes that no table shows
@@ -418,6 +418,6 @@ def _named(
         largest_first = np.argsort(-energy, kind="stable")
         shares = {moving[j]: float(energy[j]) for j in largest_first if energy[j] >= LEAST_SHARE}
         listed.append(Mode(name_of[k], complex(value), shares, shapes))
-    remarks = (*prepared.remarks, *divergence(parts, found))
-    about = remarks, parameter, prepared.name, prepared.place
-    return Modes(speed, prepared.contact, tuple(listed), *about)
+    remarks = (*linear.remarks, *divergence(parts, found))
+    about = remarks, parameter, linear.name, linear.place
+    return Modes(speed, linear.contact, tuple(listed), *about)

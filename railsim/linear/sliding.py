@@ -48,11 +48,11 @@ class Sliding(SteadyRolling):
         self._first = internal_begin(model.index.n_bodies)
         self._since = since
 
-    def _evaluated(self, states: Floats) -> Floats:
+    def _derivatives(self, states: Floats) -> Floats:
         """Derivatives of several states, one a row; friction forces are put into the states."""
         derivatives = np.empty_like(states)
         for state, derivative in zip(states, derivatives, strict=True):
-            derivative[:] = super()._evaluated(state[None])
+            derivative[:] = super()._derivatives(state[None])
             if self._since is not None and len(self._pads):
                 stiffness = self.system.internal.parameter[self._pads, 0]
                 deflection, force = self._since
@@ -61,7 +61,7 @@ class Sliding(SteadyRolling):
                 settle_limits(
                     self.system.internal, self.system.curves, self._first, self.work.drive, state
                 )
-                derivative[:] = super()._evaluated(state[None])
+                derivative[:] = super()._derivatives(state[None])
         return derivatives
 
     def deflection(self) -> Floats:
@@ -96,7 +96,7 @@ class SlidingPath:
         self._model, self._placed, self._speed, self._held = model, placed, speed, held
         system, guess = placed(0.0, start)
         self.solver = Sliding(model, system, held=held)
-        self.state = self.solver.prepared(guess, speed)
+        self.state = self.solver.rolling_guess(guess, speed)
         self.share = 0.0
         self._grip = self.solver.grip(self.state)
 

@@ -49,7 +49,7 @@ def loss_of_stability(
     def modes(parameter: float) -> Eigenmodes:
         """The least damped oscillation searched, without undamped ones that do not count."""
         found = eigenmodes(at(parameter))
-        inside = _searched(found.eigenvalues)
+        inside = _in_range(found.eigenvalues)
         order = inside[np.argsort(-found.eigenvalues[inside].real)]
         ordered = [found.taken([int(k)]) for k in order]
         if counts is not None:
@@ -60,7 +60,7 @@ def loss_of_stability(
         if parameter not in known:
             # half of the time without vectors, by which modes are told apart where one is undamped
             values = np.asarray(eigvals(at(parameter).matrix), dtype=complex)
-            known[parameter] = float(np.max(values[_searched(values)].real)) - ROUNDING
+            known[parameter] = float(np.max(values[_in_range(values)].real)) - ROUNDING
             if counts is not None and known[parameter] >= 0.0:
                 known[parameter] = float(modes(parameter).eigenvalues[0].real) - ROUNDING
         return known[parameter]
@@ -119,7 +119,7 @@ def _beyond_zero(
     return float(found.x) if found.fun <= 0.0 else None
 
 
-def _searched(eigenvalues: Complexes) -> Indices:
+def _in_range(eigenvalues: Complexes) -> Indices:
     """Indices of the oscillations from `LOWEST` to 40 Hz; of all where there is none."""
     frequency = eigenvalues.imag / (2.0 * np.pi)
     inside = np.flatnonzero((frequency >= LOWEST) & (frequency <= SEARCHED[1]))

@@ -19,9 +19,9 @@ from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.state import ARC_LENGTH
 from railsim.kernels.system import FORCE, MOMENT, System
 from railsim.kernels.track_frame import PHI
-from railsim.linear.circle import POSITION, circle, placed
+from railsim.linear.circle import POSITION, at_middle, circle
 from railsim.linear.sliding import Placed, SlidingPath, has_pads
-from railsim.linear.steady import NotConverged, SteadyRolling, led
+from railsim.linear.steady import NotConverged, SteadyRolling, follow
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.work import level_track, without_loads
@@ -50,7 +50,7 @@ class Standing:
 
 def on_cant(balance: Equilibrium, track: Track, cant: float, *, held: bool = False) -> Standing:
     """Return the vehicle standing on canted straight track [m]; `held`: its wheelsets."""
-    model, start = balance.model, placed(balance.state)
+    model, start = balance.model, at_middle(balance.state)
     system = without_loads(model.system)._replace(track=track_tables(circle(track, cant=cant)))
     solver = SteadyRolling(model, system, held=held)
     state = solver.solve(start, WALKING_PACE)
@@ -150,12 +150,12 @@ def on_twist(
     raised = np.asarray(heights, dtype=float)
     solver: SteadyRolling
     if held or has_pads(balance.model):
-        path = _loaded(lambda: _path(balance, track, raised, curvature, held))
+        path = _under_full_load(lambda: _path(balance, track, raised, curvature, held))
         state, solver = path.state, path.solver
     else:
         under = _placing(balance, track, raised, curvature, held)
-        start = placed(balance.state)
-        state, solver = led(
+        start = at_middle(balance.state)
+        state, solver = follow(
             balance.model, lambda share: (under(share, start)[0], WALKING_PACE), start
         )
     solver.evaluate(state)
@@ -163,7 +163,7 @@ def on_twist(
     return Standing(state, _loads(solver, held), balance.Q0, Y)
 
 
-def _loaded(begin: Callable[[], SlidingPath]) -> SlidingPath:
+def _under_full_load(begin: Callable[[], SlidingPath]) -> SlidingPath:
     """A path at its full load, in as many steps as lead there: a long one may pass a gap."""
     for parts in (PARTS, 2):
         with suppress(NotConverged):
@@ -181,7 +181,7 @@ def _path(
 ) -> SlidingPath:
     """The way from straight level track to a twist, and to a curve."""
     under = _placing(balance, track, heights, curvature, held)
-    return SlidingPath(balance.model, under, placed(balance.state), WALKING_PACE, held=held)
+    return SlidingPath(balance.model, under, at_middle(balance.state), WALKING_PACE, held=held)
 
 
 def _placing(
@@ -194,7 +194,7 @@ def _placing(
         def rolling(share: float, state: Floats) -> tuple[System, Floats]:
             curve = circle(track, curvature=share * curvature)
             system = without_loads(model.system)._replace(track=track_tables(curve))
-            return _twisted(system, share * heights), state
+            return _on_twisted_frames(system, share * heights), state
 
         return rolling
     level = level_track(model.system._replace(track=track_tables(circle(track))))
@@ -210,7 +210,7 @@ def _placing(
     return standing
 
 
-def _twisted(system: System, heights: Floats) -> System:
+def _on_twisted_frames(system: System, heights: Floats) -> System:
     """The frame of each wheelset canted for itself; all other frames stay level."""
     coefficients = system.track.coefficients.copy()
     for body, height in zip(system.contact.body, heights, strict=True):

@@ -69,7 +69,7 @@ class SteadyRolling:
         `guess`: positions and spin rates count; position and time are kept; `speed`: [m/s]. Raises
         NotConverged: names the largest remaining accelerations.
         """
-        state = self.prepared(guess, speed)
+        state = self.rolling_guess(guess, speed)
         forces = self._forces(state)
         for _ in range(MOST_ITERATIONS):
             better = self._better(state, forces) if self._largest(forces) >= RESIDUAL else None
@@ -92,16 +92,16 @@ class SteadyRolling:
             return self._forces(states) / self._inertias
 
         near = self._unknowns < 6 * self.model.index.n_bodies
-        found = settled(accelerations, self.prepared(guess, speed), self._unknowns, near)
+        found = settled(accelerations, self.rolling_guess(guess, speed), self._unknowns, near)
         if found is None:
             raise NotConverged("no steady state")
         return self.solve(found, speed)
 
     def evaluate(self, state: Floats) -> Floats:
         """Derivative of a state, forces into `work`; NotConverged: the state is out of range."""
-        return np.asarray(self._evaluated(state[None])[0])
+        return np.asarray(self._derivatives(state[None])[0])
 
-    def _evaluated(self, states: Floats) -> Floats:
+    def _derivatives(self, states: Floats) -> Floats:
         """Derivatives of several states, one a row."""
         derivatives = np.empty_like(states)
         status, where, self.patches = right_hand_sides(self.system, self.work, states, derivatives)
@@ -109,7 +109,7 @@ class SteadyRolling:
             raise NotConverged(f"no steady state: {self.model.index.sentence(status, where)}")
         return derivatives
 
-    def prepared(self, guess: Floats, speed: float) -> Floats:
+    def rolling_guess(self, guess: Floats, speed: float) -> Floats:
         """Return a guess with the velocities of steady rolling at a speed [m/s]."""
         state = guess.copy()
         n, spins = self.model.index.n_bodies, self._spins
@@ -144,7 +144,7 @@ class SteadyRolling:
         """What is not balanced, of one state or of several, one a row."""
         rows = np.atleast_2d(states)
         self._turn_with_frames(rows)
-        rates = self._evaluated(rows)
+        rates = self._derivatives(rows)
         rates[:, self._spins] -= rows[:, self._spins] * rates[:, [SPEED]] / rows[:, [SPEED]]
         found = rates[:, self._equations] * self._inertias
         return np.asarray(found.reshape(*states.shape[:-1], -1))
@@ -182,8 +182,8 @@ class SteadyRolling:
 Systems = Callable[[float], tuple[System, float]]
 
 
-def led(
-    model: Model, along: Systems, start: Floats, *, smallest: float = 1.0 / 64.0
+def follow(
+    model: Model, systems: Systems, start: Floats, *, smallest: float = 1.0 / 64.0
 ) -> tuple[Floats, SteadyRolling]:
     """Lead a steady state from where it is known to where it is sought.
 
@@ -197,7 +197,7 @@ def led(
     length = 1.0
     while True:
         share = min(1.0, done + step)
-        system, speed = along(share)
+        system, speed = systems(share)
         solver = SteadyRolling(model, system)
         for guess in [now + (now - before) * (share - done) / length, now] if done > 0.0 else [now]:
             try:

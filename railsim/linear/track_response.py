@@ -118,14 +118,14 @@ def track_response(
     offsets = system.frame_offset[system.bodies.frame[system.contact.body]]
     x, c = free.x, free.coordinates
 
-    def evaluated(x: Floats) -> Floats:
+    def rates_and_forces(x: Floats) -> Floats:
         rates, state = free.rate(x), free.state.copy()
         state[c.indices] = x
         Q, Y = (free.work.wheel[:, :, column] for column in (W_Q, W_Y))
         lateral = against_rails(system, state[None])[0, :, 0]
         return np.concatenate([rates, Q.ravel(), Y.ravel(), Y.sum(axis=1), lateral])
 
-    of_states = jacobian(lambda rows: np.array([evaluated(row) for row in rows]), x, c.steps)
+    of_states = jacobian(lambda rows: np.array([rates_and_forces(row) for row in rows]), x, c.steps)
     columns = [*of_states.T]
     for offset in offsets:
         cell, u = divmod(POSITION + float(offset) - track.s_start, track.ds)
@@ -139,7 +139,7 @@ def track_response(
                     shape[: order + 1] = _power(order, u)
                     rail[cell] = smooth
                     rail[cell, :4] += sign * step * np.outer(shares, shape)
-                    ends.append(evaluated(x))
+                    ends.append(rates_and_forces(x))
                 columns.append((ends[0] - ends[1]) / (2.0 * step))
         rail[cell] = smooth
     whole = without_forceless(np.transpose(columns), c.forceless)
@@ -157,7 +157,7 @@ def track_response(
         np.concatenate([R, np.zeros((6 * count, n))]),
         np.array([[c.velocity_of[int(b), k] for k in COMPONENTS] for b in system.contact.body]),
         _forces_of(system, len(C)),
-        np.concatenate([np.zeros(len(C)), evaluated(x)[len(x) :]]),
+        np.concatenate([np.zeros(len(C)), rates_and_forces(x)[len(x) :]]),
     )
 
 

@@ -16,10 +16,10 @@ from railsim.definitions.loading import check_types
 from railsim.errors import Faults, ModelError, argument_error
 from railsim.kernels.internal import PAD
 from railsim.kernels.system import FIXED, RIGID, System
-from railsim.linear.circle import circle, left_out, placed
+from railsim.linear.circle import at_middle, circle, left_out
 from railsim.linear.coordinates import Coordinates, FreeVehicle, coordinates
 from railsim.linear.harmonic import ContactPath
-from railsim.linear.steady import SteadyRolling, led
+from railsim.linear.steady import SteadyRolling, follow
 from railsim.linear.system import Linearisation
 from railsim.model.assembly import Model, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
@@ -178,7 +178,7 @@ class LinearVehicle:
             raise argument_error("held", "nothing is left that moves", "hold fewer bodies")
         self._known: dict[float, Floats] = {}
         self._tangents: dict[float, tuple[FreeVehicle, Floats]] = {}
-        self._rest = placed(balance.state)
+        self._rest = at_middle(balance.state)
         there = circle(track, curvature=self.curvature, cant=cant, at=at)
         check_fixed(assembled.flat, there)
         self.system = without_loads(self.model.system)._replace(track=track_tables(there))
@@ -214,7 +214,7 @@ class LinearVehicle:
             system = self.model.system._replace(track=track_tables(part))
             return system, WALKING_PACE + math.sqrt(share) * (speed - WALKING_PACE)
 
-        return led(self.model, along, self._rest)[0]
+        return follow(self.model, along, self._rest)[0]
 
     def free(self, speed: float) -> FreeVehicle:
         """Return the vehicle about its steady rolling at a speed [m/s]."""

@@ -30,7 +30,7 @@ from railsim.kernels.support import DOF
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT, Y_LEFT, Y_RIGHT
-from railsim.linear.steady import NotConverged, SteadyRolling, led
+from railsim.linear.steady import NotConverged, SteadyRolling, follow
 from railsim.model.assembly import Model
 from railsim.model.check_rails import standing_at
 from railsim.model.equilibrium import tracks_under
@@ -247,7 +247,7 @@ def at_narrowest_gauge(model: Model, track: Track, situation: Situation) -> list
         return system._replace(track=table), float(state[SPEED])
 
     with suppress(NotConverged):  # then the usual gauge decides alone
-        return [(with_gauge(1.0)[0], led(model, with_gauge, state)[0])]
+        return [(with_gauge(1.0)[0], follow(model, with_gauge, state)[0])]
     return []
 
 

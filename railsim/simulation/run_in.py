@@ -48,8 +48,8 @@ from railsim.kernels.status import RUNNING
 from railsim.kernels.system import CONSTANT, RADIUS, TABLE, System, Work
 from railsim.kernels.time_loop import FAST
 from railsim.kernels.track_frame import FRAME_SIZE
-from railsim.linear.circle import POSITION, circle, placed
-from railsim.linear.steady import NotConverged, SteadyRolling, led
+from railsim.linear.circle import POSITION, at_middle, circle
+from railsim.linear.steady import NotConverged, SteadyRolling, follow
 from railsim.model.assembly import Model
 from railsim.model.check_rails import CheckRails, standing_at
 from railsim.model.equilibrium import Equilibrium, initial_state
@@ -169,7 +169,7 @@ def _standing(
     speed = float(balance.state[SPEED])
     try:
         solver = SteadyRolling(model, system, accelerated=accelerated)
-        state = solver.solve(placed(balance.state), speed)
+        state = solver.solve(at_middle(balance.state), speed)
     except NotConverged:  # vehicle and rails settle as the run begins
         return balance
     state[-3:] = balance.state[-3:]
@@ -390,7 +390,7 @@ def _steady(
         return level._replace(track=track_tables(_inclined(part, track, start))), speed
 
     try:
-        state = led(model, along, placed(balance.state))[0]
+        state = follow(model, along, at_middle(balance.state))[0]
     except NotConverged as error:
         remark(f"The run begins with a run-in, as Newton's method found {error}.")
         return None

@@ -48,7 +48,7 @@ class Continued:
 def followed_branches(
     motion: VehicleMotion,
     lost: LossOfStability,
-    known: Sequence[Branch],
+    branches: Sequence[Branch],
     speeds: tuple[float, float],
     progress: Progress,
 ) -> Continued:
@@ -57,7 +57,7 @@ def followed_branches(
     `lost`: of rest, with the runs' own creep law; `known`: branches of runs; `speeds`: range [m/s].
     """
     found = Continued()
-    pieces = [piece for one in known if one.direction in RUNS for piece in one.pieces()]
+    pieces = [piece for one in branches if one.direction in RUNS for piece in one.pieces()]
     pieces.sort(key=lambda piece: piece[0].speed)  # of two on one branch first the longer one
 
     def telling(number: int) -> Progress:
@@ -86,7 +86,7 @@ def followed_branches(
             f"the branch of runs from {piece[0].speed:.4g} to {piece[-1].speed:.4g} m/s, "
             f"{1e3 * seed.amplitude:.2f} mm at {seed.speed:.4g} m/s,"
         )
-        _follow(found, partial(_at, motion, seed), speeds, name, tell, pieces)
+        _follow(found, partial(_motion_near, motion, seed), speeds, name, tell, pieces)
     return found
 
 
@@ -98,7 +98,7 @@ def settled_to(branch: Branch, pieces: Sequence[Sequence[Point]]) -> Branch:
     one, and unstable as its multipliers say.
     """
 
-    def settled(point: Point) -> bool:
+    def seen_in_runs(point: Point) -> bool:
         return any(
             abs(amplitude - point.amplitude) < SAME[0] * point.amplitude
             and abs(frequency - point.frequency) < SAME[1] * point.frequency
@@ -108,12 +108,12 @@ def settled_to(branch: Branch, pieces: Sequence[Sequence[Point]]) -> Branch:
 
     return Branch(
         branch.direction,
-        [replace(point, stable=point.stable or settled(point)) for point in branch.points],
+        [replace(point, stable=point.stable or seen_in_runs(point)) for point in branch.points],
     )
 
 
 def _follow(
-    found: Continued,
+    continued: Continued,
     start: Callable[[], tuple[Shooting, PeriodicMotion]],
     speeds: tuple[float, float],
     name: str,
@@ -131,10 +131,10 @@ def _follow(
     try:
         shooting, before = start()
     except (ModelError, LeftRange) as error:
-        found.remarks.append(f"continuation: {name} is not followed: {error}")
+        continued.remarks.append(f"continuation: {name} is not followed: {error}")
         return
     try:
-        for now in shooting.followed(before, ARC_STEP, within):
+        for now in shooting.motions(before, ARC_STEP, within):
             rests = now.amplitude < min(FIRST, before.amplitude)
             if before.tangent[-1] * now.tangent[-1] < 0.0 and not rests:
                 turns.append((len(points), _point(shooting.fold(before, now))))
@@ -144,20 +144,20 @@ def _follow(
             if rests:  # beyond it the same motions follow, half a period later
                 break
     except ModelError as error:
-        found.remarks.append(
+        continued.remarks.append(
             f"continuation: {name} is followed to {before.speed:.4g} m/s only: {error}"
         )
     if len(points) >= MOST_MOTIONS:
-        found.remarks.append(
+        continued.remarks.append(
             f"continuation: {name} is followed for {MOST_MOTIONS} motions only, "
             f"to {before.speed:.4g} m/s"
         )
     if points:
         branch = settled_to(Branch("continuation", points), pieces)
-        found.branches.append(branch)
+        continued.branches.append(branch)
         for number, fold in turns:
             beside = branch.points[max(0, number - 1) : number + 1]
-            found.folds.append(replace(fold, stable=any(point.stable for point in beside)))
+            continued.folds.append(replace(fold, stable=any(point.stable for point in beside)))
 
 
 def _point(motion: PeriodicMotion) -> Point:
@@ -175,12 +175,12 @@ def _passed_at(line: Sequence[Point], speed: float) -> Iterator[tuple[float, flo
             )
 
 
-def _at(motion: VehicleMotion, seed: Point) -> tuple[Shooting, PeriodicMotion]:
+def _motion_near(motion: VehicleMotion, seed: Point) -> tuple[Shooting, PeriodicMotion]:
     """The periodic motion nearest to one of a run."""
     if not np.isfinite(seed.frequency):
         raise ModelError("the runs show no period")
     period, flow = 1.0 / seed.frequency, VehicleFlow(motion, seed.speed)
-    state = flow.reduced(seed.state)
+    state = flow.reduce(seed.state)
     scale = flow.scale(state, period, seed.speed, seed.amplitude)
     shooting = Shooting(flow, scale, period_scale=0.05 * period, speed_scale=1.0)
     try:
@@ -218,8 +218,8 @@ def _birth(motion: VehicleMotion, lost: LossOfStability) -> tuple[Shooting, Peri
     # the scheme's memory settles
     state = motion.stretch(motion.rest(speed, FIRST), speed, speed, 2.0 * period).state
     flow = VehicleFlow(motion, speed)
-    rest = flow.reduced(motion.prepared.steady(speed))
-    begin = flow.reduced(state) - rest
+    rest = flow.reduce(motion.prepared.steady(speed))
+    begin = flow.reduce(state) - rest
     quarter = flow.after((rest + begin)[None], np.array([0.25 * period]), np.array([speed]))[0]
     scale = flow.scale(rest + begin, period, speed, FIRST)
     shooting = Shooting(flow, scale, period_scale=0.05 * period, speed_scale=1.0)

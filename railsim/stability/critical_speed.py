@@ -114,39 +114,39 @@ def critical_speed(
     settings, track = settings or Settings(), track or load_track("straight")
     law = smooth_law(settings)
 
-    def prepared(settings: Settings, contact: Contact, track: Track = track) -> LinearVehicle:
+    def linear_vehicle(settings: Settings, contact: Contact, track: Track = track) -> LinearVehicle:
         return LinearVehicle(vehicle, track, contact=contact, settings=settings, profiles=profiles)
 
-    smooth = prepared(law, contact)
-    found = CriticalSpeed(contact, vehicle.name_with_load, conditions(track, settings), low, high)
-    found.remarks += smooth.remarks
-    found.conicity_over_amplitude = conicity_over_amplitude(smooth)
-    found.linear, stuck = _linear(found, smooth)
+    smooth = linear_vehicle(law, contact)
+    result = CriticalSpeed(contact, vehicle.name_with_load, conditions(track, settings), low, high)
+    result.remarks += smooth.remarks
+    result.conicity_over_amplitude = conicity_over_amplitude(smooth)
+    result.linear, stuck = _linear(result, smooth)
     tell = progress or (lambda _: None)
     tell(0.02)
     if over_amplitude:
-        found.linear_over_amplitude = _over_amplitude(smooth, low, high)
-        if found.linear is not None and smooth.system.support.elastic:
+        result.linear_over_amplitude = _over_amplitude(smooth, low, high)
+        if result.linear is not None and smooth.system.support.elastic:
             try:
-                rigid = prepared(law, contact, track.replace(support={"preset": "rigid"}))
+                rigid = linear_vehicle(law, contact, track.replace(support={"preset": "rigid"}))
                 lost = _loss_of_hunting(rigid, low, high)
-                found.linear = replace(found.linear, speed_on_rigid_rails=lost.parameter)
+                result.linear = replace(result.linear, speed_on_rigid_rails=lost.parameter)
                 if lost.parameter is None:
                     words = f"unstable at {low:g}" if lost.already else f"stable up to {high:g}"
-                    found.remarks.append(f"on rigid rails: {words} m/s")
+                    result.remarks.append(f"on rigid rails: {words} m/s")
             except ModelError as error:
-                found.remarks.append(f"on rigid rails: {error}")
+                result.remarks.append(f"on rigid rails: {error}")
     tell(0.05)
     wanted = [method for method in METHODS if method in methods and method != "linear"]
     if not any(track.frictions):
-        found.remarks.append(NO_FRICTION)
-        wanted, found.nonlinear = [], dict.fromkeys(wanted)
+        result.remarks.append(NO_FRICTION)
+        wanted, result.nonlinear = [], dict.fromkeys(wanted)
     if not wanted:
-        return found
-    of_runs = prepared(settings, Contact(conicity=conicity))
+        return result
+    of_runs = linear_vehicle(settings, Contact(conicity=conicity))
     begins = _loss_of_hunting(of_runs, low, high)
-    if found.linear is not None:
-        found.linear = replace(found.linear, speed_of_runs=begins.parameter)
+    if result.linear is not None:
+        result.linear = replace(result.linear, speed_of_runs=begins.parameter)
     shape = _hunting_shape(of_runs, begins.parameter or high)
     motion = VehicleMotion(of_runs, settings.scheme, shape)
     for number, method in enumerate(wanted):
@@ -158,24 +158,24 @@ def critical_speed(
         def search(motion: VehicleMotion, method: str = method, share: Progress = share) -> None:
             try:
                 if method == "ramp":
-                    _by_ramp(found, motion, begins, stuck, excitations, share)
+                    _by_ramp(result, motion, begins, stuck, excitations, share)
                 elif method == "bifurcation":
                     unstable = [v for v in (stuck, begins.parameter) if v is not None]
-                    _by_diagram(found, motion, unstable, points, excitations, share)
+                    _by_diagram(result, motion, unstable, points, excitations, share)
                 else:
-                    _by_continuation(found, motion, begins, share)
+                    _by_continuation(result, motion, begins, share)
             except (LeftRange, ModelError) as error:
-                found.remarks.append(f"{method}: {error}")
+                result.remarks.append(f"{method}: {error}")
 
-        before = len(found.branches), len(found.remarks)
+        before = len(result.branches), len(result.remarks)
         search(motion)
-        slowest = found.nonlinear.get(method)
+        slowest = result.nonlinear.get(method)
         if slowest and method != "continuation" and not lasts_in_shorter_steps(motion, slowest):
-            del found.branches[before[0] :], found.remarks[before[1] :], found.nonlinear[method]
+            del result.branches[before[0] :], result.remarks[before[1] :], result.nonlinear[method]
             search(motion.in_shorter_steps())
-    _conclude(found, vehicle, of_runs, begins)
-    _remark_range(found, vehicle)
-    return found
+    _conclude(result, vehicle, of_runs, begins)
+    _remark_range(result, vehicle)
+    return result
 
 
 def checked(
@@ -213,12 +213,12 @@ def checked(
     return float(slowest), float(fastest)
 
 
-def _hunts(prepared: LinearVehicle) -> Callable[[Eigenmodes], bool]:
+def _hunts(linear: LinearVehicle) -> Callable[[Eigenmodes], bool]:
     """Whether a mode is hunting: by its name, or as it grows by more than sliding would damp.
 
     Well above the critical speed the body moves with the bogies, and the mode is called after it.
     """
-    parts = parts_of(prepared.model, prepared.coordinates)
+    parts = parts_of(linear.model, linear.coordinates)
 
     def hunts(mode: Eigenmodes) -> bool:
         return mode.damping_ratios[0] < -SLIDING or mode_name(parts, mode).endswith("hunting")
@@ -227,25 +227,23 @@ def _hunts(prepared: LinearVehicle) -> Callable[[Eigenmodes], bool]:
 
 
 def _loss_of_hunting(
-    prepared: LinearVehicle, low: float, high: float, path: ContactPath | None = None
+    linear: LinearVehicle, low: float, high: float, path: ContactPath | None = None
 ) -> LossOfStability:
     """Where steady rolling loses its stability; of vehicles whose friction sticks to hunting only.
 
     Friction that sticks damps nothing: the sway of such a vehicle is slightly undamped at speeds at
     which friction, once it slides, damps it.
     """
-    counts = _hunts(prepared) if prepared.sticking else None
-    return loss_of_stability(lambda speed: prepared.linearised(speed, path), low, high, counts)
+    counts = _hunts(linear) if linear.sticking else None
+    return loss_of_stability(lambda speed: linear.linearised(speed, path), low, high, counts)
 
 
-def _linear(
-    found: CriticalSpeed, prepared: LinearVehicle
-) -> tuple[LinearLoss | None, float | None]:
+def _linear(result: CriticalSpeed, linear: LinearVehicle) -> tuple[LinearLoss | None, float | None]:
     """The linear critical speed; a remark where there is none, or where friction sticks.
 
     Besides: from which speed another mode is undamped as long as friction sticks [m/s].
     """
-    parts, low, high = parts_of(prepared.model, prepared.coordinates), found.low, found.high
+    parts, low, high = parts_of(linear.model, linear.coordinates), result.low, result.high
 
     def words(mode: Eigenmodes) -> str:
         damping = 100.0 * mode.damping_ratios[0].round(9) + 0.0  # no rounding, nor a zero's sign
@@ -254,38 +252,38 @@ def _linear(
             f"{mode.linearisation.parameter:g} m/s"
         )
 
-    lost, stuck = _loss_of_hunting(prepared, low, high), None
+    lost, stuck = _loss_of_hunting(linear, low, high), None
     # on hollow treads it grows about as the speed: at walking pace it may pass for none
-    ends = (divergence(parts, eigenmodes(prepared.linearised(speed))) for speed in (low, high))
-    found.divergence = next(filter(None, ends), ())
-    found.remarks += found.divergence
-    if prepared.sticking:
-        other = loss_of_stability(prepared.linearised, low, lost.parameter or high)
+    ends = (divergence(parts, eigenmodes(linear.linearised(speed))) for speed in (low, high))
+    result.divergence = next(filter(None, ends), ())
+    result.remarks += result.divergence
+    if linear.sticking:
+        other = loss_of_stability(linear.linearised, low, lost.parameter or high)
         mode = other.modes[0]
         begins = other.parameter is not None and other.parameter != lost.parameter
-        if (begins or other.already) and not _hunts(prepared)(mode):
+        if (begins or other.already) and not _hunts(linear)(mode):
             stuck = float(mode.linearisation.parameter)
-            found.remarks.append(
+            result.remarks.append(
                 f"{mode_name(parts, mode)}, {mode.frequencies[0]:.3g} Hz, is undamped from "
                 f"{mode.linearisation.parameter:.4g} m/s or less as long as all friction elements "
                 "stick; sliding limits it, so that it does not count as loss of stability"
             )
     if lost.already or lost.parameter is not None:
-        found.remarks += _stable_again(prepared, lost.parameter or low, high)
+        result.remarks += _stable_again(linear, lost.parameter or low, high)
     if lost.parameter is not None:
         mode = lost.modes[0]
         frequency = float(mode.frequencies[0])
         return LinearLoss(lost.parameter, frequency, mode_name(parts, mode)), stuck
-    found.unstable_at_low = lost.already
+    result.unstable_at_low = lost.already
     why = f"no linear critical speed from {low:g} to {high:g} m/s; least damped"
     why = "unstable at the lower end of the range" if lost.already else why
-    found.remarks.append(f"{why}: {'; '.join(map(words, lost.modes))}")
+    result.remarks.append(f"{why}: {'; '.join(map(words, lost.modes))}")
     return None, stuck
 
 
-def _stable_again(prepared: LinearVehicle, lost: float, high: float) -> list[str]:
+def _stable_again(linear: LinearVehicle, lost: float, high: float) -> list[str]:
     """Remark where rest is stable above the speed at which it is not: the sway of a body hunts."""
-    at, before, speed = prepared.linearised, lost, AGAIN * lost
+    at, before, speed = linear.linearised, lost, AGAIN * lost
     while speed < high and (above := loss_of_stability(at, speed, high)).already:  # by any mode
         before, speed = speed, AGAIN * speed
     if speed >= high:
@@ -299,12 +297,12 @@ def _stable_again(prepared: LinearVehicle, lost: float, high: float) -> list[str
     ]
 
 
-def _over_amplitude(prepared: LinearVehicle, low: float, high: float) -> OverAmplitude:
+def _over_amplitude(linear: LinearVehicle, low: float, high: float) -> OverAmplitude:
     """Linear critical speeds with harmonic linearisation, up to the width of the contact table."""
     found = OverAmplitude()
     for amplitude in AMPLITUDES:
         try:
-            lost = _loss_of_hunting(prepared, low, high, ContactPath(amplitude))
+            lost = _loss_of_hunting(linear, low, high, ContactPath(amplitude))
         except InputError:
             break
         critical = lost.modes[0] if lost.parameter is not None else None
@@ -314,15 +312,15 @@ def _over_amplitude(prepared: LinearVehicle, low: float, high: float) -> OverAmp
     return found
 
 
-def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:
+def _hunting_shape(linear: LinearVehicle, speed: float) -> Eigenmodes:
     """The mode in whose shape hunting is excited: of several the least damped.
 
     Where none is a hunting mode, one whose wheelsets move across by half of all else at least.
     """
-    found = oscillations(eigenmodes(prepared.linearised(speed)), SEARCHED[1])
-    hunts, names = _hunts(prepared), found.linearisation.names
+    found = oscillations(eigenmodes(linear.linearised(speed)), SEARCHED[1])
+    hunts, names = _hunts(linear), found.linearisation.names
     hunting = [k for k in range(len(found.eigenvalues)) if hunts(found.taken([k]))]
-    lateral = [names.index(f"{wheelset}.y") for wheelset in prepared.model.index.wheelsets]
+    lateral = [names.index(f"{wheelset}.y") for wheelset in linear.model.index.wheelsets]
     # m and rad: a symmetric mode has lateral motions by rounding only
     positions = [k for k, name in enumerate(names) if name.rpartition(".")[2] in COMPONENTS]
     most, all_else = (np.abs(found.shapes)[:, at].max(axis=1) for at in (lateral, positions))
@@ -331,44 +329,44 @@ def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:
 
 
 def _by_ramp(
-    found: CriticalSpeed,
+    result: CriticalSpeed,
     motion: VehicleMotion,
     begins: LossOfStability,
     stuck: float | None,
     excitations: Sequence[float],
     progress: Progress,
 ) -> None:
-    lowest, branch = ramp(motion, found.low, found.high, progress, excitations)
-    found.branches.append(branch)
-    found.nonlinear["ramp"] = lowest  # kept if a further one leaves the rails
-    unstable = found.low if begins.already else begins.parameter
-    end = found.high if lowest is None else lowest.speed
+    lowest, branch = ramp(motion, result.low, result.high, progress, excitations)
+    result.branches.append(branch)
+    result.nonlinear["ramp"] = lowest  # kept if a further one leaves the rails
+    unstable = result.low if begins.already else begins.parameter
+    end = result.high if lowest is None else lowest.speed
     above = (v for v in (stuck, unstable) if v and end > (v if v is stuck else _far_above(v)))
     for at in sorted(above):  # the sway of stuck friction is another motion, however near
         # hunting dies above speeds at which rest is unstable: what it becomes there is sought too
         for top in (tops := tops_above(at, end)):
-            slower, further = ramp(motion, found.low, top, excitations=excitations)
-            found.branches.append(further)
+            slower, further = ramp(motion, result.low, top, excitations=excitations)
+            result.branches.append(further)
             if slower is not None:
-                found.nonlinear["ramp"] = lowest = slower
+                result.nonlinear["ramp"] = lowest = slower
                 break
         if lowest is not None and lowest.speed < end:
             break
         if at == unstable:
             words = " and ".join(f"{top:.4g}" for top in tops)
-            found.remarks.append(
+            result.remarks.append(
                 f"ramp: rest is unstable at {at:.4g} m/s, but what is excited at {words} m/s dies "
                 "or derails (bifurcation)"
             )
     top = branch.points[0].speed
     end = lowest.speed if lowest else top
-    for slower, further in below(motion, end, found.low, max(excitations)):
-        found.branches.append(further)
-        found.nonlinear["ramp"] = lowest = slower
+    for slower, further in below(motion, end, result.low, max(excitations)):
+        result.branches.append(further)
+        result.nonlinear["ramp"] = lowest = slower
     if lowest is None:
-        found.remarks.append(f"ramp: nothing hunts {_after(excitations)} at {top:.4g} m/s")
-    if top < found.high:
-        found.remarks.append(f"ramp: the vehicle derails above {top:.4g} m/s")
+        result.remarks.append(f"ramp: nothing hunts {_after(excitations)} at {top:.4g} m/s")
+    if top < result.high:
+        result.remarks.append(f"ramp: the vehicle derails above {top:.4g} m/s")
 
 
 def _after(excitations: Sequence[float]) -> str:
@@ -383,44 +381,46 @@ def _far_above(speed: float) -> float:
 
 
 def _by_diagram(
-    found: CriticalSpeed,
+    result: CriticalSpeed,
     motion: VehicleMotion,
     unstable: Sequence[float],
     points: int,
     excitations: Sequence[float],
     progress: Progress,
 ) -> None:
-    speeds = speeds_about(unstable, found.low, found.high, points)
-    found.remarks += filter(None, [unresolved(speeds, unstable)])
-    branches = diagram(motion, speeds, progress, excitations, found.low)
+    speeds = speeds_about(unstable, result.low, result.high, points)
+    result.remarks += filter(None, [unresolved(speeds, unstable)])
+    branches = diagram(motion, speeds, progress, excitations, result.low)
     if not branches[0].points:
         raise LeftRange(f"the vehicle derails at {speeds[0]:.4g} m/s, the lowest speed")
-    found.nonlinear["bifurcation"] = lowest = lowest_of(branches)
-    found.branches += branches
-    found.jumps = jumps(branches)
+    result.nonlinear["bifurcation"] = lowest = lowest_of(branches)
+    result.branches += branches
+    result.jumps = jumps(branches)
     reached, tried = max(p.speed for p in branches[0].points), _after(excitations)
     if reached < speeds[-1]:
-        found.remarks.append(f"bifurcation: the vehicle derails above {reached:.4g} m/s")
+        result.remarks.append(f"bifurcation: the vehicle derails above {reached:.4g} m/s")
     if lowest is None:
-        found.remarks.append(f"bifurcation: nothing hunts {tried} at any of the {points} speeds")
+        result.remarks.append(f"bifurcation: nothing hunts {tried} at any of the {points} speeds")
 
 
 def _by_continuation(
-    found: CriticalSpeed, motion: VehicleMotion, begins: LossOfStability, progress: Progress
+    result: CriticalSpeed, motion: VehicleMotion, begins: LossOfStability, progress: Progress
 ) -> None:
-    followed = followed_branches(motion, begins, found.branches, (found.low, found.high), progress)
-    found.branches += followed.branches
-    found.remarks += followed.remarks
+    followed = followed_branches(
+        motion, begins, result.branches, (result.low, result.high), progress
+    )
+    result.branches += followed.branches
+    result.remarks += followed.remarks
     # a branch that is left unfinished ends at its slowest motion or further down
     ends = [*followed.folds, *(point for one in followed.branches for point in one.points)]
     if begins.parameter is not None and followed.begins is not None:
         rising = followed.begins.speed > begins.parameter - 0.5 * RESOLUTION
-        found.onset = "supercritical" if rising else "subcritical"
+        result.onset = "supercritical" if rising else "subcritical"
         ends.append(Point(begins.parameter, 0.0, float(begins.modes[0].frequencies[0])))
     if ends:
-        found.nonlinear["continuation"] = slowest = min(ends, key=lambda point: point.speed)
+        result.nonlinear["continuation"] = slowest = min(ends, key=lambda point: point.speed)
         if not slowest.stable:
-            found.remarks.append(
+            result.remarks.append(
                 f"continuation: the motion of {1e3 * slowest.amplitude:.2f} mm at "
                 f"{slowest.speed:.4g} m/s is unstable, no run stays at it: a larger disturbance "
                 "grows to another one, which was not followed from there"
@@ -440,59 +440,61 @@ def _unstable_force(vehicle: Vehicle, Q0: Floats) -> float:
 
 
 def _conclude(
-    found: CriticalSpeed, vehicle: Vehicle, prepared: LinearVehicle, begins: LossOfStability
+    result: CriticalSpeed, vehicle: Vehicle, linear: LinearVehicle, begins: LossOfStability
 ) -> None:
     """Find type and limits from all branches.
 
     Where rest is unstable at the lower end already, nothing was seen to hunt where it becomes so,
     or hunting on other branches was not sought, the type is not known.
     """
-    lowest, at = found.lowest, begins.parameter
-    already = begins.already or found.divergence
-    if not found.nonlinear:
+    lowest, at = result.lowest, begins.parameter
+    already = begins.already or result.divergence
+    if not result.nonlinear:
         return  # every method failed, as the remarks say
-    if only_from_rest := found.nonlinear.keys() == {"continuation"}:
-        found.remarks.append(
+    if only_from_rest := result.nonlinear.keys() == {"continuation"}:
+        result.remarks.append(
             "continuation: only what begins where rest loses its stability was followed; other "
             "motions, as on the flange, may last to lower speeds (bifurcation, ramp)"
         )
     if lowest is None:
-        found.type = "" if already or at is not None else "none"
+        result.type = "" if already or at is not None else "none"
     elif already or (at is not None and lowest.speed > _far_above(at)):
-        found.type = found.onset
-    elif at is None or lowest.speed < at - RESOLUTION or found.onset == "subcritical":
-        found.type = "subcritical"
+        result.type = result.onset
+    elif at is None or lowest.speed < at - RESOLUTION or result.onset == "subcritical":
+        result.type = "subcritical"
     elif not only_from_rest:
-        found.type = "supercritical"
+        result.type = "supercritical"
     # a ramp passes the end of a branch late
-    only_ramp = "ramp" in found.nonlinear and "bifurcation" not in found.nonlinear
+    only_ramp = "ramp" in result.nonlinear and "bifurcation" not in result.nonlinear
     branches = [
         Branch(one.direction, [point for point in one.points if point.speed >= one.end])
-        for one in found.branches
+        for one in result.branches
         if only_ramp or one.direction != "ramp"
     ]
-    branches += [Branch("sustained", [point]) for point in found.nonlinear.values() if point]
-    found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.searched_to)
+    branches += [Branch("sustained", [point]) for point in result.nonlinear.values() if point]
+    result.amplitude_limit = first_beyond(
+        branches, AMPLITUDE_LIMIT, "amplitude", result.searched_to
+    )
     if not only_from_rest:  # shooting knows no forces
-        force = _unstable_force(vehicle, prepared.Q0)
-        found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.searched_to)
+        force = _unstable_force(vehicle, linear.Q0)
+        result.instability_limit = first_beyond(branches, force, "sum_Y_rms", result.searched_to)
     if only_ramp and lowest is not None:
-        found.remarks.append(
+        result.remarks.append(
             "limits: on the falling ramp alone; at constant speed they are exceeded from up to "
             "2 m/s above, after other disturbances perhaps where this motion does not (bifurcation)"
         )
 
 
-def _remark_range(found: CriticalSpeed, vehicle: Vehicle) -> None:
+def _remark_range(result: CriticalSpeed, vehicle: Vehicle) -> None:
     """Say what hunts below the range, or where a vehicle is to be judged above it."""
-    for method, point in found.nonlinear.items():
-        if point is not None and point.speed <= found.low:
-            found.remarks.append(f"{method}: hunts still at the lower end, {found.low:g} m/s")
+    for method, point in result.nonlinear.items():
+        if point is not None and point.speed <= result.low:
+            result.remarks.append(f"{method}: hunts still at the lower end, {result.low:g} m/s")
     if vehicle.service is None:
         return
     needed = MARGIN * vehicle.service.admissible_speed
-    if found.high < needed:
-        found.remarks.append(
-            f"searched to {found.high:g} m/s, less than {needed:.4g} m/s, {MARGIN:g} times the "
+    if result.high < needed:
+        result.remarks.append(
+            f"searched to {result.high:g} m/s, less than {needed:.4g} m/s, {MARGIN:g} times the "
             "admissible speed: hunting above is not seen"
         )

@@ -27,12 +27,12 @@ from railsim.kernels.internal import PAD
 from railsim.kernels.state import ARC_LENGTH, SPEED
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
-from railsim.linear.circle import POSITION, circle, left_out, placed
+from railsim.linear.circle import POSITION, at_middle, circle, left_out
 from railsim.linear.coordinates import FreeVehicle, coordinates
 from railsim.linear.eigenmodes import GROWS, eigenmodes
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import parts_of
-from railsim.linear.steady import NotConverged, SteadyRolling, led
+from railsim.linear.steady import NotConverged, SteadyRolling, follow
 from railsim.linear.vehicle import WALKING_PACE
 from railsim.model.assembly import assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
@@ -321,7 +321,7 @@ class _Search:
         self.parts = parts_of(self.model, coordinates(self.model))
         self.shares = np.ones(2)
         values = np.array([0.0, 0.0, WALKING_PACE**2, np.mean(track.friction_at(0.0))])
-        self._rest = self._last = values, placed(balance.state)
+        self._rest = self._last = values, at_middle(balance.state)
 
     def _system(self, curvature: float, cant: float, friction: float) -> System:
         left, right = (friction * self.shares).tolist()
@@ -342,20 +342,20 @@ class _Search:
                 return self._system(curvature, cant, mu), math.sqrt(square)
 
             with suppress(NotConverged):
-                found, solver = led(self.model, along, start, smallest=1.0 / 16.0)
+                found, solver = follow(self.model, along, start, smallest=1.0 / 16.0)
                 self._last = goal, found
-                return self._judged(solver, found, goal)
+                return self._stable_or_in_time(solver, found, goal)
         return self._in_time(goal, speed)
 
-    def _judged(self, solver: SteadyRolling, found: Floats, goal: Floats) -> Point:
+    def _stable_or_in_time(self, solver: SteadyRolling, state: Floats, goal: Floats) -> Point:
         """A steady state of Newton's method; where it is unstable, what a run comes to instead."""
-        free = FreeVehicle(self.model, solver.system, found)
+        free = FreeVehicle(self.model, solver.system, state)
         if eigenmodes(free.linearisation(free.tangent())).eigenvalues.real.max() < GROWS:
-            return solver, [found], NEWTON
-        timed = self._in_time(goal, float(found[SPEED]))
+            return solver, [state], NEWTON
+        timed = self._in_time(goal, float(state[SPEED]))
         at = free.coordinates.indices[free.coordinates.positions]
-        if timed[2] == TIME and np.allclose(timed[1][0][at], found[at], rtol=0.0, atol=SAME):
-            return solver, [found], NEWTON
+        if timed[2] == TIME and np.allclose(timed[1][0][at], state[at], rtol=0.0, atol=SAME):
+            return solver, [state], NEWTON
         return timed
 
     def _in_time(self, goal: Floats, speed: float) -> Point:
@@ -364,7 +364,7 @@ class _Search:
         solver = SteadyRolling(self.model, self._system(curvature, cant, friction))
         straight = self._system(0.0, 0.0, friction)
         try:
-            rolling = SteadyRolling(self.model, straight).prepared(self._rest[1], speed)
+            rolling = SteadyRolling(self.model, straight).rolling_guess(self._rest[1], speed)
             stable = Stability(self.model, straight, rolling, "fast", lambda _: ())
             step = 0.5 * stable.choose(INTERVAL)  # half of it in flange contact
             state = self._into(goal, speed, straight, rolling, step)
@@ -437,14 +437,14 @@ class _Search:
             **arrays,
         )
 
-    def fill(self, found: Curving, index: tuple[int, int, int], point: Point) -> None:
+    def fill(self, result: Curving, index: tuple[int, int, int], point: Point) -> None:
         """Put the values of a point into the result; none where it failed."""
         solver, states, how = point
-        found.converged[index] = how
+        result.converged[index] = how
         if how != FAILED:
             values = [self._values(solver, state) for state in states]
             for name in values[0]:
-                getattr(found, name)[index] = np.mean([each[name] for each in values], axis=0)
+                getattr(result, name)[index] = np.mean([each[name] for each in values], axis=0)
 
     def _values(self, solver: SteadyRolling, state: Floats) -> dict[str, Any]:
         """The values of `Curving` in one state."""

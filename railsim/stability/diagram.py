@@ -88,9 +88,9 @@ def diagram(
         try:
             last = up.points[-1] if up.points else None
             if last is None or last.amplitude < ramp.SMALL:  # where it rests, a small disturbance
-                seen = settled(motion, motion.rest(speed, ramp.SMALL), speed, speed)
+                seen = settle(motion, motion.rest(speed, ramp.SMALL), speed, speed)
             else:
-                seen = settled(motion, last.state, last.speed, speed)
+                seen = settle(motion, last.state, last.speed, speed)
             up.points.append(seen_at(speed, seen))
         except LeftRange:
             break
@@ -104,7 +104,7 @@ def diagram(
         if speed < reached[0] and down.points[-1].amplitude <= THRESHOLD:
             break
         try:
-            seen = settled(motion, state, before, speed)
+            seen = settle(motion, state, before, speed)
         except LeftRange:  # while it brakes
             seen = ramp.hunting(motion, speed, excitations)
         down.points.append(seen_at(speed, seen))
@@ -114,7 +114,7 @@ def diagram(
     for number, speed in enumerate(reached):
         branches += _further(motion, branches, speed, excitations, lower)
         tell(0.5 + 0.25 * number / len(reached))
-    up, down = (_refined(motion, branch) for branch in branches[:2])
+    up, down = (_refine(motion, branch) for branch in branches[:2])
     branches[:2] = up, down
     between = _threshold(motion, up, down, lambda share: tell(0.75 + 0.25 * share))
     return [*branches, *([between] if between.points else [])]
@@ -127,7 +127,7 @@ def _below(speeds: Sequence[float], low: float) -> list[float]:
     return [*found, low] if first - low > 1e-9 else []
 
 
-def settled(
+def settle(
     motion: Motion, state: Floats, begin: float, speed: float, known: Sequence[float] = ()
 ) -> Stretch:
     """Go from one speed to another, and there until the amplitude changes no more, or has died.
@@ -135,7 +135,7 @@ def settled(
     `known`: amplitudes of motions at that speed, with 0 for rest: near these it need not settle
     [m].
     """
-    state, before = ramp.moved(motion, state, begin, speed), np.inf
+    state, before = ramp.at_speed(motion, state, begin, speed), np.inf
     dead = THRESHOLD if 0.0 in known else 0.02 * THRESHOLD
     lasting, turned, grew = 0, 0, False
     for look in count(1):
@@ -188,32 +188,32 @@ def _further(
     for size in excitations:
         known = _amplitudes([*branches, *found], speed)
         try:
-            here = seen_at(speed, settled(motion, motion.rest(speed, size), speed, speed, known))
+            here = seen_at(speed, settle(motion, motion.rest(speed, size), speed, speed, known))
         except LeftRange:
             continue
         if not _is_known(here, [*branches, *found]):
-            down, up = (_followed(motion, branches, here, side) for side in (below, above))
+            down, up = (_follow(motion, branches, here, side) for side in (below, above))
             found.append(Branch("further", [*down[:0:-1], *up]))
     return found
 
 
-def _followed(
+def _follow(
     motion: Motion, branches: Sequence[Branch], start: Point, speeds: Sequence[float]
 ) -> list[Point]:
     """A motion followed over several speeds, to the first that is known or dead."""
     points = [start]
     for speed in speeds:
         try:
-            seen = settled(motion, points[-1].state, points[-1].speed, speed)
+            seen = settle(motion, points[-1].state, points[-1].speed, speed)
         except LeftRange:
             break
         points.append(seen_at(speed, seen))
         if _is_known(points[-1], branches):
             break
-    return _refined(motion, Branch("further", points)).points
+    return _refine(motion, Branch("further", points)).points
 
 
-def _refined(motion: Motion, branch: Branch) -> Branch:
+def _refine(motion: Motion, branch: Branch) -> Branch:
     """The branch with more speeds where its amplitude changes much, as it does at its ends.
 
     Where rest loses its stability no more are needed: the eigenvalues tell that speed.
@@ -233,7 +233,7 @@ def _between(motion: Motion, before: Point, after: Point) -> list[Point]:
     # near a fold what dies does so slowly: where rest follows, it is not waited for to the last
     known = [0.0] if after.amplitude < THRESHOLD else []
     try:
-        here = seen_at(middle, settled(motion, before.state, before.speed, middle, known))
+        here = seen_at(middle, settle(motion, before.state, before.speed, middle, known))
     except LeftRange:
         return []
     return [*_between(motion, before, here), here, *_between(motion, here, after)]
@@ -253,7 +253,7 @@ def _threshold(motion: Motion, up: Branch, down: Branch, tell: ramp.Progress) ->
     for number, speed in enumerate(inside):
         near = [branch.nearest(speed) for branch in (down, up)]
         try:
-            upper, lower = (settled(motion, one.state, one.speed, speed) for one in near)
+            upper, lower = (settle(motion, one.state, one.speed, speed) for one in near)
         except LeftRange:
             continue
         if lower.amplitude < DROP * upper.amplitude:

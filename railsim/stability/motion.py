@@ -91,14 +91,14 @@ class VehicleMotion:
     far less of a disturbance becomes hunting.
     """
 
-    def __init__(self, prepared: LinearVehicle, scheme: str, mode: Eigenmodes) -> None:
-        self.prepared, self.model, self.system = prepared, prepared.model, prepared.system
+    def __init__(self, linear: LinearVehicle, scheme: str, mode: Eigenmodes) -> None:
+        self.prepared, self.model, self.system = linear, linear.model, linear.system
         self.scheme = scheme
         self._steps: dict[int, float] = {}
         self._parts = 1
         self._allocate()
-        names, known = prepared.coordinates.names, mode.linearisation.names
-        self._disturbed = prepared.coordinates.indices[[names.index(name) for name in known]]
+        names, known = linear.coordinates.names, mode.linearisation.names
+        self._disturbed = linear.coordinates.indices[[names.index(name) for name in known]]
         lateral = [known.index(f"{wheelset}.y") for wheelset in self.model.index.wheelsets]
         self._shape = (mode.shapes[0] / np.max(np.abs(mode.shapes[0, lateral]))).real
 
@@ -108,7 +108,7 @@ class VehicleMotion:
         self._derivative, self._stages = np.zeros(size), np.zeros((3, size))
         self._recorder = empty_recorder(self.model, int(LONGEST * OUTPUT_RATE) + 2)
 
-    def beside(self) -> "VehicleMotion":
+    def own_copy(self) -> "VehicleMotion":
         """Return the same vehicle with arrays of its own, to move in another thread."""
         other = copy(self)
         other._allocate()
@@ -116,7 +116,7 @@ class VehicleMotion:
 
     def in_shorter_steps(self) -> "VehicleMotion":
         """Return the same vehicle in shorter steps, with arrays of its own."""
-        other = self.beside()
+        other = self.own_copy()
         other._parts = SHORTER * self._parts
         return other
 

@@ -115,7 +115,7 @@ class Shooting:
             -scaled.imag / np.linalg.norm(scaled.imag),
         )
 
-    def followed(
+    def motions(
         self, start: PeriodicMotion, step: float, within: Callable[[PeriodicMotion], bool]
     ) -> Iterator[PeriodicMotion]:
         """Yield the motions of the branch while they are `within`, the first beyond it too.
@@ -142,7 +142,7 @@ class Shooting:
 
     def ahead(self, now: PeriodicMotion, length: float) -> tuple[PeriodicMotion, int]:
         """Return the motion one arc length further, and iterations; ModelError: none is found."""
-        ahead, iterations = self._solved(now, now.tangent, length)
+        ahead, iterations = self._solve(now, now.tangent, length)
         if np.linalg.norm(self._way(now, ahead)) > BENT * abs(length) + NEAR:
             raise ModelError("the motions found are not on one branch")
         return ahead, iterations
@@ -172,9 +172,9 @@ class Shooting:
         far.
         """
         change = (speed - near.speed) / self._scale[-1]
-        return self._solved(near, np.eye(len(near.tangent))[-1], change)[0]
+        return self._solve(near, np.eye(len(near.tangent))[-1], change)[0]
 
-    def _solved(
+    def _solve(
         self, now: PeriodicMotion, direction: Floats, length: float
     ) -> tuple[PeriodicMotion, int]:
         """Solve for the motion at `length` from a known one, measured in `direction`."""

@@ -40,7 +40,7 @@ CLOSE, BELOW = 0.95, 0.8
 ABOVE_END = 0.5  # m/s, by which the end of a branch may move with the step
 
 
-def excited(motion: Motion, speed: float, amplitude: float) -> Stretch:
+def excite(motion: Motion, speed: float, amplitude: float) -> Stretch:
     """Excite hunting at a speed by a disturbance [m] and let it settle; one that derails is halved.
 
     Raises LeftRange: even a small disturbance ends in a derailment.
@@ -58,13 +58,13 @@ def excited(motion: Motion, speed: float, amplitude: float) -> Stretch:
 def hunting(motion: Motion, speed: float, excitations: Sequence[float]) -> Stretch:
     """What the largest disturbance ends in, or a smaller one where it dies."""
     for size in sorted(excitations, reverse=True):
-        seen = excited(motion, speed, size)
+        seen = excite(motion, speed, size)
         if seen.amplitude > THRESHOLD:
             break
     return seen
 
 
-def grown(motion: Motion, seen: Stretch, speed: float) -> Stretch:
+def grow(motion: Motion, seen: Stretch, speed: float) -> Stretch:
     """What a motion grows to, such as a sway of stuck friction by a tenth in 10 s.
 
     A ramp from a motion far smaller than that dies at speeds at which the grown one lasts.
@@ -79,7 +79,7 @@ def grown(motion: Motion, seen: Stretch, speed: float) -> Stretch:
     return seen
 
 
-def moved(motion: Motion, state: Floats, begin: float, end: float) -> Floats:
+def at_speed(motion: Motion, state: Floats, begin: float, end: float) -> Floats:
     """A state at another speed, after braking or accelerating to it."""
     if abs(end - begin) < 1e-9:
         return state
@@ -116,7 +116,7 @@ def ramp(
     while True:
         hard: list[Point] = []
         try:
-            seen = grown(motion, hunting(motion, speed, excitations), speed)
+            seen = grow(motion, hunting(motion, speed, excitations), speed)
             hard.append(seen_at(speed, seen))
             _brake(motion, hard, low, BRAKING, lambda share: tell(0.3 * share))
             break
@@ -149,8 +149,8 @@ def below(
     while (tried := ratio * speed) > low:
         ratio = BELOW * (1.0 if ratio == CLOSE else ratio)
         with suppress(LeftRange):  # every disturbance derails, or what it becomes
-            seen = excited(motion, tried, excitation)
-            if seen.amplitude > THRESHOLD and sustained(motion, seen.state, tried):
+            seen = excite(motion, tried, excitation)
+            if seen.amplitude > THRESHOLD and sustain(motion, seen.state, tried):
                 lowest, branch = ramp(motion, low, tried, excitations=(excitation,))
                 if lowest is not None:
                     yield lowest, branch
@@ -180,19 +180,19 @@ def _lowest(motion: Motion, points: Sequence[Point]) -> Point | None:
     if not alive:
         return None
 
-    def at(speed: float) -> Point | None:
+    def sustained_at(speed: float) -> Point | None:
         """The motion sustained at a speed, from the slowest state that hunts there or above."""
         source = [point for point in alive if point.speed >= speed - 1e-9][-1]
-        return sustained(motion, moved(motion, source.state, source.speed, speed), speed)
+        return sustain(motion, at_speed(motion, source.state, source.speed, speed), speed)
 
     upper, lower, step = alive[-1].speed, points[-1].speed, 2.0 * RESOLUTION
-    best = at(upper)
+    best = sustained_at(upper)
     while best is None and upper < alive[0].speed:
         lower, upper, step = upper, min(alive[0].speed, upper + step), 2.0 * step
-        best = at(upper)
+        best = sustained_at(upper)
     while best is not None and upper - lower > RESOLUTION:
         middle = 0.5 * (lower + upper)
-        found = at(middle)
+        found = sustained_at(middle)
         if found is None:
             lower = middle
         else:
@@ -200,7 +200,7 @@ def _lowest(motion: Motion, points: Sequence[Point]) -> Point | None:
     return best
 
 
-def sustained(motion: Motion, state: Floats, speed: float) -> Point | None:
+def sustain(motion: Motion, state: Floats, speed: float) -> Point | None:
     """What a system does after a long run at constant speed, None if its oscillation dies.
 
     Near the fold an oscillation that lasts settles as slowly as one that does not dies: the run
@@ -219,15 +219,15 @@ def sustained(motion: Motion, state: Floats, speed: float) -> Point | None:
     return None
 
 
-def lasts_in_shorter_steps(motion: VehicleMotion, found: Point) -> bool:
+def lasts_in_shorter_steps(motion: VehicleMotion, slowest: Point) -> bool:
     """Whether a motion lasts in shorter steps, at its speed or, at the end of its branch, above.
 
     At walking pace and in steps as long as the tread allows, creep forces on a flange alternate
     from step to step and may hold a wheelset there that would leave it.
     """
     finer = motion.in_shorter_steps()
-    for speed in (found.speed, found.speed + ABOVE_END):
+    for speed in (slowest.speed, slowest.speed + ABOVE_END):
         with suppress(LeftRange):
-            if sustained(finer, moved(finer, found.state, found.speed, speed), speed):
+            if sustain(finer, at_speed(finer, slowest.state, slowest.speed, speed), speed):
                 return True
     return False

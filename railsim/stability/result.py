@@ -239,14 +239,14 @@ class CriticalSpeed(Plottable):
         return words
 
 
-def conicity_over_amplitude(prepared: LinearVehicle) -> Conicity | None:
+def conicity_over_amplitude(linear: LinearVehicle) -> Conicity | None:
     """Equivalent conicity of the leading wheelset at the amplitudes that its profiles allow.
 
     Where it falls with the amplitude below 3 mm, small limit cycles come first (Polach 2006).
     """
-    body = prepared.model.flat.of_kind("wheelset")[0]
+    body = linear.model.flat.of_kind("wheelset")[0]
     assert body.wheelset is not None
-    if (geometry := geometry_of(body.wheelset, prepared.track, prepared.model.profiles)) is None:
+    if (geometry := geometry_of(body.wheelset, linear.track, linear.model.profiles)) is None:
         return None
     values = _conicities(geometry)
     known = np.isfinite(values)

@@ -63,7 +63,7 @@ class VehicleFlow:
         indices, floors = zip(*found, strict=True)
         return np.array(indices, dtype=np.int64), np.array(floors)
 
-    def reduced(self, state: Floats) -> Floats:
+    def reduce(self, state: Floats) -> Floats:
         """Moving entries of a state of the time loop."""
         full = state.copy()
         full[self._spins] -= self._per_speed * state[SPEED]
@@ -80,7 +80,7 @@ class VehicleFlow:
     @cached_property
     def _threads(self) -> list[VehicleMotion]:
         """The motion, and the same for each further core."""
-        return [self._motion, *(self._motion.beside() for _ in range(available_cores() - 1))]
+        return [self._motion, *(self._motion.own_copy() for _ in range(available_cores() - 1))]
 
     def _steps(self, duration: float) -> int:
         """Number of steps in a period of the length of the runs' steps, as nearly as it fits."""
@@ -97,7 +97,7 @@ class VehicleFlow:
                 with suppress(LeftRange):
                     step = float(durations[k]) / steps
                     motion.advance(self._system, full, step, Chunk(1, steps, 1 << 40))
-                    ends[k] = self.reduced(full)
+                    ends[k] = self.reduce(full)
 
         threads = self._threads[: len(states)]
         every = [range(i, len(states), len(threads)) for i in range(len(threads))]
@@ -113,7 +113,7 @@ class VehicleFlow:
     def scale(self, state: Floats, duration: float, speed: float, amplitude: float) -> Floats:
         """Size of each component in a motion of 1 mm, from a motion of a known amplitude."""
         rows = self._motion.records(self._observe(state, duration, speed))
-        size = 0.5 * np.ptp([self.reduced(row) for row in rows], axis=0) * 1e-3 / amplitude
+        size = 0.5 * np.ptp([self.reduce(row) for row in rows], axis=0) * 1e-3 / amplitude
         return np.asarray(np.maximum(size, self._floors))
 
     def _observe(self, state: Floats, duration: float, speed: float) -> int:

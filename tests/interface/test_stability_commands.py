@@ -501,7 +501,7 @@ def test_steady_curving_in_time_has_neither_given_forces_nor_a_speed_profile(mon
     def fails(*_, **__):
         raise NotConverged("no steady state")
 
-    monkeypatch.setattr(curving, "led", fails)
+    monkeypatch.setattr(curving, "follow", fails)
     in_time = railsim.curving(windy, settings=railsim.Settings(drive=slow), **how)
     assert in_time.converged.item() == curving.TIME
     np.testing.assert_allclose(in_time.Y, found.Y, atol=50.0)

@@ -35,7 +35,7 @@ from railsim.stability.critical_speed import (
 )
 from railsim.stability.diagram import diagram, speeds_about, unresolved
 from railsim.stability.motion import OUTPUT_RATE, LeftRange, Stretch
-from railsim.stability.ramp import lasts_in_shorter_steps, ramp, sustained
+from railsim.stability.ramp import lasts_in_shorter_steps, ramp, sustain
 from railsim.stability.result import OF_CONICITY, Conicity, CriticalSpeed, OverAmplitude
 from railsim.stability.vehicle_flow import VehicleFlow
 
@@ -199,8 +199,8 @@ class Cycles:
 def test_whether_a_slow_oscillation_lasts_is_decided_by_whole_periods(phase):
     """0.36 Hz: 2.8 s, of which 1 s shows 0.1 to 0.9 of the amplitude."""
     dies = Cycles(lambda _: -0.02, 0.36)
-    assert sustained(dies, np.array([2e-3, phase]), 16.0) is None
-    lasts = sustained(Cycles(lambda _: 0.4, 0.36), np.array([1e-3, phase]), 16.0)
+    assert sustain(dies, np.array([2e-3, phase]), 16.0) is None
+    lasts = sustain(Cycles(lambda _: 0.4, 0.36), np.array([1e-3, phase]), 16.0)
     assert lasts.amplitude == pytest.approx(2e-3, rel=0.02)
 
 
@@ -820,7 +820,7 @@ class Parabola:
             tangent=tangent, is_stable=p > 2.0,
         )  # fmt: skip
 
-    def followed(self, start, length, within):
+    def motions(self, start, length, within):
         now, inside = start, True
         while inside:
             if now.p + self.step > self.last:
@@ -842,7 +842,7 @@ def continued(monkeypatch, birth, known=(), seeds=None, speeds=(50.0, 64.0), par
         raise ModelError("its motion is not periodic")
 
     monkeypatch.setattr(continuation, "_birth", lambda *_: (birth, birth.at(0.0)))
-    monkeypatch.setattr(continuation, "_at", of_run)
+    monkeypatch.setattr(continuation, "_motion_near", of_run)
     lost, told = SimpleNamespace(parameter=parameter), []
     return continuation.followed_branches(None, lost, known, speeds, told.append), told
 
@@ -985,9 +985,9 @@ def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest
     of = LinearVehicle(load_vehicle("coach_manchester"), railsim.load_track("straight"))
     motion = SimpleNamespace(prepared=of, model=of.model, system=of.system, step_at=lambda _: 1e-3)
     flow = VehicleFlow(motion, 20.0)
-    rest = flow.full(flow.reduced(of.steady(20.0)), 20.0)
+    rest = flow.full(flow.reduce(of.steady(20.0)), 20.0)
     changed = rest + np.random.default_rng(1).standard_normal(rest.size)
-    after = flow.full(flow.reduced(changed), 20.0)
+    after = flow.full(flow.reduce(changed), 20.0)
     first = 6 * of.system.bodies.reference
     assert after[first] == rest[first]
     assert np.array_equal(after[first + 1 : first + 6], changed[first + 1 : first + 6])
@@ -1002,7 +1002,7 @@ def test_motions_in_threads_are_those_one_after_the_other(monkeypatch):
     of = LinearVehicle(load_vehicle("coach_manchester"), railsim.load_track("straight"))
     motion = motion_of.VehicleMotion(of, "fast", CRITICAL._hunting_shape(of, 20.0))
     flow = VehicleFlow(motion, 20.0)
-    states = [flow.reduced(motion.rest(20.0, size)) for size in np.linspace(-4e-3, 4e-3, 7)]
+    states = [flow.reduce(motion.rest(20.0, size)) for size in np.linspace(-4e-3, 4e-3, 7)]
     ends = []
     for cores in (1, 3):
         monkeypatch.setattr(vehicle_flow, "available_cores", lambda cores=cores: cores)
@@ -1075,7 +1075,7 @@ class HeldByTheStep:
 @pytest.mark.parametrize(("finer", "lasts"), [(20.0, True), (20.3, True), (40.0, False)])
 def test_what_a_long_step_holds_is_told_from_a_motion_whose_end_moves_with_it(finer, lasts):
     motion = HeldByTheStep(20.0, finer)
-    found = sustained(motion, np.zeros(1), 20.0)
+    found = sustain(motion, np.zeros(1), 20.0)
     assert found.hunts
     assert lasts_in_shorter_steps(motion, found) is lasts
 

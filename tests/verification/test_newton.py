@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from railsim.linear.steady import NotConverged, SteadyRolling, led
+from railsim.linear.steady import NotConverged, SteadyRolling, follow
 
 TURNED, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))
 
@@ -129,7 +129,7 @@ class Steps:
 def test_a_way_that_is_too_far_is_gone_in_halves(monkeypatch, longest, shares):
     """From the second step on along the line through the last two states."""
     steps = Steps(monkeypatch, longest)
-    found, _ = led(None, lambda share: (share, 40.0 * share), np.zeros(1), smallest=1e-4)
+    found, _ = follow(None, lambda share: (share, 40.0 * share), np.zeros(1), smallest=1e-4)
     assert found == pytest.approx([3.0])
     taken = [row[0] for row in steps.tried]
     assert list(dict.fromkeys(taken))[: len(shares)] == pytest.approx(list(dict.fromkeys(shares)))
@@ -144,5 +144,5 @@ def test_a_way_that_is_too_far_is_gone_in_halves(monkeypatch, longest, shares):
 def test_a_way_ends_where_steps_become_too_small(monkeypatch, smallest):
     steps = Steps(monkeypatch, 0.0)
     with pytest.raises(NotConverged, match="made to fail"):
-        led(None, lambda share: (share, 40.0), np.zeros(1), smallest=smallest)
+        follow(None, lambda share: (share, 40.0), np.zeros(1), smallest=smallest)
     assert min(row[0] for row in steps.tried) >= smallest > 0.5 * min(r[0] for r in steps.tried)

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from railsim.stability.branches import THRESHOLD, Branch, Point, far_apart, jumps, lowest_of
-from railsim.stability.diagram import _below, diagram, settled, speeds_about
+from railsim.stability.diagram import _below, diagram, settle, speeds_about
 from railsim.stability.motion import LeftRange, Stretch
-from railsim.stability.ramp import excited, looked_at, moved, ramp, tops_above
+from railsim.stability.ramp import at_speed, excite, looked_at, ramp, tops_above
 from railsim.stability.ramp import hunting as largest_hunting
 
 A0, RATE, OMEGA, STEP = 4e-3, 4.0, 12.0, 0.01
@@ -119,11 +119,11 @@ def test_only_changes_within_the_resolution_are_jumps():
 def test_a_motion_that_grows_is_followed_to_its_end():
     """Decaying below the threshold it counts as dead, growing from below it does not."""
     start = NormalForm().rest(51.0, 2e-6)
-    assert settled(NormalForm(), start, 51.0, 51.0).amplitude == pytest.approx(
+    assert settle(NormalForm(), start, 51.0, 51.0).amplitude == pytest.approx(
         hunting(51.0)[0], rel=0.01
     )
     start = NormalForm().rest(45.5, 4e-3)
-    assert settled(NormalForm(), start, 45.5, 45.5).amplitude == pytest.approx(
+    assert settle(NormalForm(), start, 45.5, 45.5).amplitude == pytest.approx(
         hunting(45.5)[0], rel=0.01
     )
 
@@ -135,7 +135,7 @@ def test_slow_growth_just_above_the_loss_of_stability_is_followed_to_its_end(abo
     It passes 20 um by 4 % or 8 % between two looks, a known motion there is not where it ends.
     """
     start = NormalForm().rest(LOST + above, 1e-5)
-    seen = settled(NormalForm(), start, LOST + above, LOST + above, [2e-5])
+    seen = settle(NormalForm(), start, LOST + above, LOST + above, [2e-5])
     assert seen.amplitude == pytest.approx(hunting(LOST + above)[0], rel=0.01)
 
 
@@ -237,7 +237,7 @@ class Recorded:
 def test_a_disturbance_that_derails_is_halved_until_it_does_not():
     """It settles for 10 s and is looked at for 2 s; below 10 um it is given up."""
     motion = Recorded(lambda state, _: None if state > 2e-3 else state)
-    seen = excited(motion, 40.0, 11e-3)
+    seen = excite(motion, 40.0, 11e-3)
     assert [row[0] for row in motion.asked] == pytest.approx(
         [11e-3, 5.5e-3, 2.75e-3] + [1.375e-3] * 2
     )
@@ -248,7 +248,7 @@ def test_a_disturbance_that_derails_is_halved_until_it_does_not():
     assert seen.sum_Y_rms == pytest.approx(1.375e3 / math.sqrt(2.0), rel=1e-2)
     motion = Recorded(lambda state, _: None)
     with pytest.raises(LeftRange):
-        excited(motion, 40.0, 8e-5)
+        excite(motion, 40.0, 8e-5)
     assert [row[0] for row in motion.asked] == pytest.approx([8e-5, 4e-5, 2e-5, 1e-5])
 
 
@@ -281,7 +281,7 @@ def test_a_motion_too_slow_for_a_look_is_looked_at_for_four_seconds(period, dura
 ])  # fmt: skip
 def test_a_state_is_brought_to_another_speed_at_half_a_metre_per_second_squared(begin, end, asked):
     motion = Recorded(lambda state, _: state)
-    assert moved(motion, np.array([1e-3]), begin, end) == pytest.approx([1e-3])
+    assert at_speed(motion, np.array([1e-3]), begin, end) == pytest.approx([1e-3])
     assert motion.asked == asked
 
 

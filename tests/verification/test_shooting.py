@@ -67,7 +67,7 @@ def branch():
     shooting = Shooting(AmplitudeEquation(), SCALE, period_scale=0.02, speed_scale=1.0)
     shape = np.array([1.0, -1.0j, 0.0]) * 5.0
     start = shooting.beginning(1e-12 * np.ones(3), shape, OMEGA / 2.0 / np.pi, 50.0)
-    return shooting, start, list(shooting.followed(start, 0.5, lambda motion: motion.speed < 52.0))
+    return shooting, start, list(shooting.motions(start, 0.5, lambda motion: motion.speed < 52.0))
 
 
 def test_a_branch_has_motions_periods_and_multipliers_of_the_closed_form(branch):
@@ -102,8 +102,8 @@ def test_a_fold_takes_few_searches_and_of_motions_that_are_known_none(monkeypatc
     """Each takes a matrix, 10 s where a period lasts 3 s."""
     shooting, _, motions = branch
     (k,) = (k for k, m in enumerate(motions[1:]) if motions[k].tangent[-1] < 0.0 < m.tangent[-1])
-    searches, solved = [], shooting._solved
-    monkeypatch.setattr(shooting, "_solved", lambda *at: searches.append(at) or solved(*at))
+    searches, solved = [], shooting._solve
+    monkeypatch.setattr(shooting, "_solve", lambda *at: searches.append(at) or solved(*at))
     fold = shooting.fold(motions[k], motions[k + 1])
     assert fold.speed == pytest.approx(45.0, abs=1e-4)
     assert len(searches) <= 3
@@ -169,7 +169,7 @@ def test_what_dies_within_a_period_takes_no_flows():
 def test_a_motion_off_the_tangent_is_on_another_branch(monkeypatch, branch):
     """By 45 degrees and more: a shorter step is tried."""
     shooting, start, motions = branch
-    monkeypatch.setattr(shooting, "_solved", lambda *_: (motions[0], 5))
+    monkeypatch.setattr(shooting, "_solve", lambda *_: (motions[0], 5))
     assert shooting.ahead(start, 0.5) == (motions[0], 5)
     with pytest.raises(ModelError, match="not on one branch"):
         shooting.ahead(start, 0.3)
@@ -216,7 +216,7 @@ def test_steps_that_fail_are_halved_and_grow_by_a_half_where_few_iterations_were
 
     monkeypatch.setattr(shooting, "ahead", ahead)
     begin = SimpleNamespace(count=0)
-    followed = shooting.followed(begin, 0.8, lambda motion: motion.count < 4)
+    followed = shooting.motions(begin, 0.8, lambda motion: motion.count < 4)
     if fails(99, 1e-3):
         with pytest.raises(ModelError, match="made to fail"):
             list(followed)
@@ -250,7 +250,7 @@ class Turning:
         state[:2] += self.at(step * chunk.steps)
         return len(self.time)
 
-    def beside(self):
+    def own_copy(self):
         return self
 
     def at(self, t):
@@ -280,12 +280,12 @@ def turning():
 
 def test_what_moves_is_taken_from_a_state_and_put_back_with_spins_less_those_of_rolling(turning):
     state = np.array([0.1, 0.2, 7.0, 7.0, 7.0, -50.3, 7.0, 7.0, 25.0])
-    reduced = turning.reduced(state)
+    reduced = turning.reduce(state)
     assert reduced == pytest.approx([0.1, 0.2, -0.3])
     found = turning.full(reduced, 30.0)
     assert found[:6] == pytest.approx([0.1, 0.2, 2.0, 3.0, 4.0, -60.3])
     assert found[-1] == 30.0
-    assert turning.reduced(found) == pytest.approx(reduced)
+    assert turning.reduce(found) == pytest.approx(reduced)
 
 
 @pytest.mark.parametrize(("duration", "steps"), [(0.5, 500), (0.4996, 500), (0.003, 8)])

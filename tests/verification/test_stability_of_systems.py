@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from railsim.linear.eigenmodes import divergent, eigenmodes, followed, oscillations
+from railsim.linear.eigenmodes import divergent, eigenmodes, follow_modes, oscillations
 from railsim.linear.stability_loss import loss_of_stability
 from railsim.linear.system import Linearisation, jacobian
 from railsim.stability.periodic import Shooting
@@ -40,7 +40,7 @@ def birth():
 def motions(birth):
     """Motions along the branch, and the one where it turns back in speed."""
     branch, start = birth
-    found = list(branch.followed(start, 2.0, lambda motion: motion.speed < 75.5))
+    found = list(branch.motions(start, 2.0, lambda motion: motion.speed < 75.5))
     turns = [k for k in range(1, len(found)) if found[k - 1].tangent[-1] < 0 < found[k].tangent[-1]]
     (k,) = turns
     return found, branch.fold(found[k - 1], found[k])
@@ -54,7 +54,7 @@ def test_a_matrix_is_formed_once_a_motion_and_updated_between(birth, monkeypatch
     branch, start = birth
     ends, flows = branch._ends, []
     monkeypatch.setattr(branch, "_ends", lambda rows: (flows.append(len(rows)), ends(rows))[1])
-    found = list(branch.followed(start, 2.0, lambda motion: motion.speed > 67.2))
+    found = list(branch.motions(start, 2.0, lambda motion: motion.speed > 67.2))
     assert len(found) == 11
     assert sum(flows) < 28 * len(found)
     for motion in found:
@@ -241,7 +241,7 @@ def test_modes_keep_their_rows_where_frequencies_cross():
         return Linearisation(("a", "b", "a'", "b'"), matrix, np.zeros(4), p)
 
     grid = np.linspace(1.0, 3.1, 8)
-    sets = followed(at, grid)
+    sets = follow_modes(at, grid)
     first, second = (np.array([modes.eigenvalues[i].imag for modes in sets]) for i in (0, 1))
     assert first == pytest.approx(grid, rel=1e-3)
     assert second == pytest.approx(np.full(8, 2.0), rel=1e-3)
@@ -251,7 +251,7 @@ def test_an_oscillation_that_becomes_overdamped_leaves_its_row_empty():
     def at(c):
         return Linearisation(("x", "v"), np.array([[0.0, 1.0], [-1.0, -c]]), np.zeros(2), c)
 
-    sets = followed(at, [1.0, 1.5, 2.5, 1.8])
+    sets = follow_modes(at, [1.0, 1.5, 2.5, 1.8])
     values = np.array([modes.eigenvalues for modes in sets])
     assert not any(map(divergent, sets))  # it grows by nan 1/s
     assert values.shape == (4, 2)

@@ -94,7 +94,7 @@ def test_where_newton_fails_the_run_in_is_used_which_is_said(monkeypatch):
     def failed(*_):
         raise NotConverged("no steady state; it was not looked for")
 
-    monkeypatch.setattr(run_in, "led", failed)
+    monkeypatch.setattr(run_in, "follow", failed)
     monkeypatch.setattr(run_in, "TIMES", (1.0, 1.0))
     vehicle, track, remarks = load_vehicle("coach_manchester"), curve("rigid", 600.0), []
     assert np.array_equal(started(vehicle, track, remarks.append)[0], started(vehicle, track)[0])

@@ -16,9 +16,9 @@ from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import WHEELSET
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.kernels.track_frame import OMEGA
-from railsim.linear.circle import POSITION, circle, placed
+from railsim.linear.circle import POSITION, at_middle, circle
 from railsim.linear.stationary import WALKING_PACE, on_cant, on_twist, roll_coefficient
-from railsim.linear.steady import NotConverged, SteadyRolling, led
+from railsim.linear.steady import NotConverged, SteadyRolling, follow
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
 from railsim.simulation.run_in import settle_in_curve
@@ -38,7 +38,7 @@ def curving(vehicle, radius, cant, speed, friction=None):
         part = circle(track, curvature=share / radius, cant=share * cant, friction=friction)
         return balance.model.system._replace(track=track_tables(part)), speed
 
-    found, solver = led(balance.model, along, placed(balance.state))
+    found, solver = follow(balance.model, along, at_middle(balance.state))
     return found, solver, balance
 
 
