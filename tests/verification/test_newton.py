@@ -15,7 +15,7 @@ def solver(forces, inertias=1.0):
     made = SteadyRolling.__new__(SteadyRolling)
     made._unknowns, made._inertias = np.arange(3), np.full(3, inertias)
     made._forces = lambda states: np.apply_along_axis(lambda x: forces(x[:3]), -1, states)
-    made.prepared = lambda guess, speed: guess.copy()
+    made.rolling_guess = lambda guess, speed: guess.copy()
     made._equations = ("a", "b", "c")
     index = SimpleNamespace(largest_left=lambda names, left, count: f"{names[np.argmax(left)]}")
     made.model = SimpleNamespace(index=index)
