@@ -289,6 +289,8 @@ def test_a_root_locus_as_named_arrays():
     there = locus.sets[1].modes[locus.names.index("front hunting")]
     assert float(mode["damping_ratio"]) == pytest.approx(there.damping_ratio)
     assert float(mode["frequency"]) == pytest.approx(there.frequency)
+    rate = 2.0 * np.pi * data["natural_frequency"]
+    np.testing.assert_allclose(rate, np.abs(data["eigenvalue"]))  # NaN where a mode is not
     alone = locus.sets[1].to_xarray().sel(speed=30.0, mode="front hunting")
     assert float(alone["damping_ratio"]) == pytest.approx(there.damping_ratio)
 

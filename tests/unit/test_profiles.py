@@ -443,6 +443,13 @@ def test_decimal_commas_between_commas_are_refused_with_the_remedy(tmp_path):
     assert (fault.key, "semicolons" in fault.allowed) == ("line 1", True)
 
 
+@pytest.mark.parametrize("columns", ["Y,A", "X,A", "A,N"])
+def test_miniprof_without_both_coordinates_is_refused_with_the_columns(tmp_path, columns):
+    text = miniprof(*WHEEL).replace("ColumnDef=X,Y,A", f"ColumnDef={columns}")
+    fault = refused(tmp_path, text, name="profile.whl")
+    assert fault.found == f"ColumnDef={columns}"
+
+
 def test_letters_between_the_points_of_miniprof_are_refused_with_their_line(tmp_path):
     path = written(tmp_path, "wheel.whl", miniprof(*WHEEL).replace("\n-5", "\nx-5"))
     with pytest.raises(InputError, match=r"line \d+: not a pair of numbers: 'x-5"):

@@ -373,6 +373,14 @@ def test_measured_file_is_interpolated_and_becomes_part_of_the_track(measured):
 METRES = {"": 1.0, "_m": 1.0, "_mm": 0.001, "_km": 1000.0, "_in": 0.0254, "_ft": 12 * 0.0254}
 
 
+def test_summary_of_a_record_says_its_scale_where_it_has_one():
+    rows = [[float(s), 0.0, 0.0, 0.0, 0.0] for s in range(5)]
+    assert Measured(type="measured", rows=rows).summary() == "measured, 5 rows"
+    assert (
+        Measured(type="measured", rows=rows, scale=2.5).summary() == "measured, 5 rows, times 2.5"
+    )
+
+
 @pytest.mark.parametrize("unit", METRES)
 @pytest.mark.parametrize("form", ["rails", "track"])
 def test_columns_of_a_measured_file_move_the_rails_as_they_are_defined(form, unit, tmp_path):
