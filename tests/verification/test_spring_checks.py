@@ -10,7 +10,7 @@ from selection import points
 
 from railsim.definitions.loading import load_spring
 from railsim.errors import InputError
-from railsim.plot.springs import ride_height_figure, stiffness_figure
+from railsim.plot.springs import goodman_figure, ride_height_figure, stiffness_figure
 from railsim.springs import checks
 from railsim.springs.design import design
 from railsim.springs.summary import design_data, fatigue_data, ride_height_data, verification_data
@@ -66,6 +66,16 @@ def test_goodman_limit_lies_between_its_corners(tau_min):
     limit = checks.goodman_limit(GOODMAN, tau_min)
     assert 430e6 <= limit <= 690e6
     assert limit >= tau_min
+
+
+def test_goodman_diagram_is_drawn_in_megapascal(suspension):
+    found = fatigue(suspension)
+    axes = goodman_figure(suspension, found).axes[0]
+    limit = next(line for line in axes.lines if line.get_label() == "Goodman-Smith line")
+    assert np.allclose(1e6 * limit.get_xydata(), suspension.fatigue.goodman)
+    ranges = [1e6 * line.get_ydata() for line in axes.lines if np.ptp(line.get_xdata()) == 0.0]
+    for spring in found.values():
+        assert any(np.allclose(ends, [spring.tau_min, spring.tau_max]) for ends in ranges)
 
 
 def test_goodman_limit_at_its_corners():
