@@ -3,6 +3,8 @@
 Every case is one wrong value in a file that is right otherwise; nothing is computed or written.
 """
 
+import re
+
 import pytest
 from example_result import example_result
 
@@ -324,3 +326,25 @@ def test_what_is_wrong_is_said_before_long_work(work, given, words, tmp_path, mo
 def test_a_refused_number_does_not_read_like_its_limit(command, found, capsys):
     assert main(command) == 2
     assert found in capsys.readouterr().err
+
+
+REQUIRED = [
+    "fmu coach straight --out x.fmu",
+    "export r.h5 --out x.csv",
+    "identify coach m.toml --parameters p.toml",
+    "curving coach --radius 300",
+    "wear coach --route straight 20 1 --distance 1 --step 1",
+    "rail-wear straight --traffic coach 20 1 --tonnage 1 --step 1",
+    "assess-track r.csv --vehicles coach --speeds 20 --out x",
+]
+
+
+@pytest.mark.parametrize("line", REQUIRED, ids=lambda line: line.split()[0])
+def test_an_option_without_which_a_command_has_no_task_is_asked_for(line, capsys):
+    command, *options = re.split(" (?=--)", line)
+    for name in (option.split()[0] for option in options):
+        rest = [
+            word for option in options if not option.startswith(name) for word in option.split()
+        ]
+        assert main([*command.split(), *rest]) == 2
+        assert f"Missing option '{name}'" in capsys.readouterr().err

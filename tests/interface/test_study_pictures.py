@@ -183,6 +183,16 @@ def test_points_of_a_sample_are_drawn_where_they_are():
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x", "y")
 
 
+@pytest.mark.parametrize(("filled", "is_map"), [(9, True), (5, True), (4, False)])
+def test_numbers_over_two_parameters_are_a_map_where_half_of_the_grid_is_there(filled, is_map):
+    places = [(a, b) for a in (1.0, 2.0, 3.0) for b in (10.0, 20.0, 30.0)]
+    chosen = [places[k] for k in (0, 4, 8, 1, 2, 3, 5, 6, 7)[:filled]]  # three of each
+    x, y = zip(*chosen, strict=True)
+    drawn = Column("Q", [1.0] * filled)
+    axes = map_figure([drawn], Column("x", list(x)), Column("y", list(y))).axes[0]
+    assert bool(axes.get_images()) is is_map
+
+
 def test_map_and_ranking_hold_the_values():
     image = map_figure([VALUES], SPEED, VEHICLE).axes[0].get_images()[0]
     assert image.get_array().tolist() == [[1.0, 2.0], [3.0, 4.0]]

@@ -346,6 +346,22 @@ def test_a_ramp_counts_for_the_limits_beside_small_motions_without_forces():
 
 
 @pytest.mark.parametrize(
+    ("loses_stability", "unstable_at_low", "kind"),
+    [(None, False, "none"), (40.1, False, ""), (None, True, "")],
+)
+def test_where_nothing_hunts_there_is_no_bifurcation_unless_rest_is_unstable(
+    loses_stability, unstable_at_low, kind
+):
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=120.0)
+    found.nonlinear = {"ramp": None}
+    begins = SimpleNamespace(
+        Q0=np.full((4, 2), 7e4), already=unstable_at_low, parameter=loses_stability
+    )
+    CRITICAL._conclude(found, load_vehicle("coach_manchester"), begins, begins)
+    assert found.type == kind
+
+
+@pytest.mark.parametrize(
     ("slowest", "ramp", "kind"),
     [(40.06, None, ""), (39.2, None, "subcritical"), (40.06, 39.8, "subcritical"),
      (40.06, 40.1, "supercritical")],
