@@ -9,7 +9,7 @@ import pytest
 import railsim
 from railsim.result import open_run
 from railsim.studies.case import load_case
-from railsim.studies.execute import Job, compile_on_cluster, perform_remotely
+from railsim.studies.execute import Job, _marks, compile_on_cluster, perform_remotely
 from railsim.studies.spec import RunSpec
 
 distributed = pytest.importorskip("distributed")
@@ -24,6 +24,15 @@ def arrays(folder):
         result = open_run(path)
         found[path.name] = {name: result[name] for name in result}
     return found
+
+
+def test_folders_are_marked_while_workers_are_asked_whether_they_see_them(tmp_path):
+    folders = {tmp_path / "a", tmp_path / "b"}
+    for folder in folders:
+        folder.mkdir()
+    with _marks(folders) as mark:
+        assert all((folder / mark).exists() for folder in folders)
+    assert not any(list(folder.iterdir()) for folder in folders)
 
 
 def test_job_whose_folder_is_not_seen_sends_its_files_back(tmp_path):
