@@ -71,6 +71,27 @@ def test_sections_end_before_the_cant_changes():
     assert short.reason == "50 m of a curve of 500 m, a section needs 100 m"
 
 
+def test_curves_drawn_in_several_elements_are_cut_as_one_and_a_ramp_divides_them():
+    """Two elements of 120 m hold two sections of 100 m, not one each: they follow one another."""
+    limits = load_running_limits("en14363")
+    service = Service(admissible_speed=40.0, cant_deficiency=0.15)
+    plan = [{"type": "CIR", "length": 480.0, "radius": 500.0}]
+    level = {"type": "CST", "length": 120.0, "cant": 0.10}
+    # a ramp there and back: 0.10 m again behind it
+    ramps = [{"type": "LIR", "length": 120.0, "cant_end": c} for c in (0.05, 0.10)]
+    for cant, begins in (
+        ([level] * 4, [0.05, 100.05, 200.05, 300.05]),
+        ([level, *ramps, level], [0.05, 360.05]),
+    ):
+        track = Track(format="railsim-track/1", name="t", plan=plan, cant=cant, rounding=0.1)
+        found = track_sections(track, limits, service, (0.0, 480.0), lambda _: 20.0)
+        assert [s.begin for s in found] == pytest.approx(begins, abs=1e-9)
+    halves = [{"type": "CIR", "length": 120.0, "radius": 500.0}] * 2
+    track = Track(format="railsim-track/1", name="t", plan=halves, cant=[level] * 2, rounding=0.1)
+    found = track_sections(track, limits, service, (0.0, 240.0), lambda _: 20.0)
+    assert [s.begin for s in found] == pytest.approx([0.05, 100.05], abs=1e-9)
+
+
 def of_curve(radius, cant, speed, length=1000.0):
     """Sections of a circle at a speed."""
     limits = load_running_limits("en14363")
