@@ -10,8 +10,10 @@ from selection import points
 from railsim.definitions.loading import load_mechanism
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
+from railsim.mechanisms.assembly import dead_loop
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.dynamics import free_motion
+from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.model import build
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
@@ -328,6 +330,41 @@ def test_an_exact_parallelogram_stretched_out_is_a_dead_point(tmp_path):
     fault = refused(load_mechanism(path))
     assert "driver at 0.0000 deg: a dead point" in fault.found  # was: cannot be assembled
     assert "(joints left, right, begin, end)" in fault.found
+
+
+SECOND_LOOP = """
+[bodies.rod]
+points = { begin = [0.0, 0.0], end = ["base", 0.0] }
+[bodies.lever]
+points = { pin = [0.0, 0.0], end = ["0.9 * base", 0.0] }
+[joints.far]
+revolute = ["ground.far", "lever.pin"]
+[joints.third]
+revolute = ["rocker.end", "rod.begin"]
+[joints.fourth]
+revolute = ["rod.end", "lever.end"]
+[start]
+crank = { angle = -0.5 }
+rocker = { angle = -0.5 }
+lever = { angle = -0.4 }
+"""
+
+
+@pytest.mark.parametrize("size", [0.1, 1.0, 10.0])
+def test_joints_at_a_dead_point_are_those_of_its_loop_whatever_the_size(tmp_path, size):
+    """A second loop, driven by a parallelogram that is 1.5 mrad from the line, is not at one.
+
+    There it bears some 0.7 permille of the forces of the first loop.
+    """
+    path = tmp_path / "two.toml"
+    text = FOUR_BAR.format(rocker=0.4 * size, end=-1.5e-3) + "start = -0.5\n" + SECOND_LOOP
+    text = text.replace("base = 1.0", f"base = {size}").replace("arm = 0.4", f"arm = {0.4 * size}")
+    far = 'far = ["1.9 * base", "-0.3 * base"]\n[bodies.crank]'
+    path.write_text(text.replace("[bodies.crank]", far))
+    model = build(load_mechanism(path))
+    motion = solve(model, np.linspace(model.start, model.end, 30))
+    named = dead_loop(model, model.end, motion.q[-1], motion.arcs[-1])
+    assert named == ("left", "right", "begin", "end")
 
 
 TINY = 5e-324  # the smallest number above 0
