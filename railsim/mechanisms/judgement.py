@@ -263,7 +263,7 @@ class Judge:
         """Residuals, shape (lane, residual); amounts whose largest is added to their squares."""
         parts, peaks = [], np.zeros((len(ratio), 1), dtype=complex)
         for kind, weight in self.weights.items():
-            root = np.sqrt(weight * (1.0 if kind == "peak_force" else self.every))
+            root = np.sqrt(weight * self.every)
             if kind == "follow":
                 parts.append(root * (ratio - self.positions.ratio))
             elif kind in ("constant", "linear"):

@@ -122,6 +122,19 @@ def test_gradients_of_the_search_are_those_of_differences(kind):
         assert margins == pytest.approx(here.slopes[:, k], rel=1e-5, abs=1e-5)
 
 
+def test_a_search_at_every_fourth_position_weighs_as_one_at_all():
+    """A sum over a quarter of the positions counts four times; the largest force is no sum."""
+    mechanism = load_mechanism(
+        "atr95_lift_4", ["optimise.objective={follow = 2.0, peak_force = 1e-5}"]
+    )
+    full, rough = Judge(mechanism), Judge(mechanism, every=4)
+    x = np.array([float(full.values[name]) for name in full.names]) + 1e-3
+    whole, part = full(x, {}), rough(x, {})
+    ratio = whole.residuals / np.sqrt(2.0)
+    assert part.residuals == pytest.approx(np.sqrt(4.0 * 2.0) * ratio[::4], rel=1e-9)
+    assert part.peak == pytest.approx(whole.peak, rel=1e-3)  # at other positions
+
+
 @pytest.mark.parametrize("name", WITH_FORCE)
 def test_virtual_work_agrees_with_the_multipliers(models, motions, name):
     # with the force that virtual work gives, nothing is left for the driver to add
