@@ -17,6 +17,7 @@ from railsim.definitions.loading import (
 )
 from railsim.errors import Fault, InputError, PackageMissing
 from railsim.files import sources
+from railsim.files.access import is_file
 from railsim.files.overrides import split_overrides
 
 HEAD = 'format = "railsim-vehicle/1"\nname = "mine"\n'
@@ -298,6 +299,15 @@ def test_missing_file_names_what_is_shipped(tmp_path):
     (fault,) = faults(load_vehicle, tmp_path)
     assert "is a folder" in fault.found
     (fault,) = faults(load_settings, "nowhere.toml")
+    assert "no file" in fault.found
+
+
+def test_a_name_that_the_system_refuses_is_no_file():
+    """Longer than names may be: it is missed like any other, with what is shipped."""
+    name = 300 * "x"
+    assert is_file(__file__)
+    assert not is_file(name)
+    (fault,) = faults(load_track, name)
     assert "no file" in fault.found
 
 
