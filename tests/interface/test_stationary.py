@@ -10,10 +10,11 @@ import railsim.studies.stationary
 from railsim.cli import main
 from railsim.definitions.loading import load_stationary_limits
 from railsim.linear.circle import circle
-from railsim.linear.stationary import WALKING_PACE
+from railsim.linear.stationary import WALKING_PACE, TwistLoop
 from railsim.linear.steady import NotConverged
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
+from railsim.plot.stability import twist_figure
 from railsim.stability.curving import curving
 from railsim.studies.stationary import Stationary, StationaryValue, _force, stationary
 
@@ -97,6 +98,17 @@ def test_both_branches_of_a_wagon_are_told_and_drawn(tmp_path, capsys):
     assert loop["share"][-1] == 1.0 > loop["share"][0]
     assert len(loop["Q"]) == len(loop["share"])
     assert (out / "stationary.png").stat().st_size > 5000
+
+
+def test_the_picture_of_a_twist_begins_on_level_track_with_no_wheel_unloaded():
+    """60 kN on level track: 54 and 48 kN on half and on the whole twist are 0.1 and 0.2 less."""
+    share, less = np.array([0.5, 1.0, 0.5, 0.0]), np.array([6e3, 12e3, 9e3, 3e3])
+    Q = 60e3 + less[:, None, None] * np.array([[0.5, -1.0], [1.0, -0.5]])
+    figure = twist_figure({"bogie": TwistLoop(share, Q, np.full((2, 2), 60e3))}, 0.6, "coach")
+    assert figure.axes[0].get_title(loc="left") == "bogie,\nwheelset 1 right"
+    drawn = figure.axes[0].lines[0].get_xydata()
+    expected = [(0.0, 0.0), (50.0, 0.1), (100.0, 0.2), (50.0, 0.15), (0.0, 0.05)]
+    assert drawn == pytest.approx(np.array(expected))
 
 
 @pytest.mark.usefixtures("guided")
