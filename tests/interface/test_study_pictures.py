@@ -3,6 +3,7 @@
 import csv
 import json
 import shutil
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,12 @@ from test_study import simulated as simulated
 
 import railsim
 import railsim.studies.case
+import railsim.studies.gathered
 from railsim.cli import main
 from railsim.cli.plot import _combine, _study_figure
 from railsim.compare import differences
 from railsim.plot.study import Column, curves_figure, map_figure, ranking_figure
+from railsim.studies.gathered import Gathered
 
 SPEEDS = [10.0, 12.0]
 
@@ -58,6 +61,30 @@ def test_medians_mix_no_vehicles_and_say_what_else(folder):
     assert "Not told apart: vehicle (options" in by_friction.get_suptitle()
     both = _combine([Column("Vehicle", ["a", "b"]), Column("Track", ["t", "u"])])
     assert (both.words, both.values) == ("Vehicle, Track", ["a, t", "b, u"])
+
+
+def test_the_axis_is_the_parameter_of_most_values_but_words_and_seeds(tmp_path, monkeypatch):
+    """Three speeds before two frictions; four vehicles and five seeds have more, but no order."""
+    labels = [
+        {"vehicle": v, "track.irregularities.0.seed": seed, "track.friction": mu, "speed": speed}
+        for v, seed, mu, speed in product("abcd", range(5), (0.3, 0.4), (10.0, 12.0, 14.0))
+    ]
+    records = [
+        {"name": f"run{k}", "status": "complete", "labels": row, "quantities": {"rise": 1.0 * k}}
+        for k, row in enumerate(labels)
+    ]
+
+    def across(*without):
+        for row in labels:
+            row.update(dict.fromkeys(without, 0))
+        figure = _study_figure(str(tmp_path), (), None, None, "curves")
+        return {axes.get_xlabel() for axes in figure.axes}
+
+    monkeypatch.setattr(railsim.studies.gathered, "gather", lambda _: Gathered(records))
+    assert across() == {"speed (m/s)"}
+    assert across("speed") == {"friction"}
+    assert across("track.friction") == {"vehicle"}
+    assert across("vehicle") == {"seed"}
 
 
 @pytest.mark.parametrize("speeds", [SPEEDS, SPEEDS[:1]])
