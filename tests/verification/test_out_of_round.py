@@ -101,6 +101,23 @@ def test_measured_flat_as_contact_finds_it(tmp_path):
         assert 1e3 * lead == pytest.approx(case["xcp_tr_mm"], abs=1.5)
 
 
+@pytest.mark.parametrize("middle", [0.0, -1.0, 1.0])
+def test_sections_of_a_chord_are_a_flat_wherever_their_angles_begin(middle):
+    """Every 2 mrad, 0.02 mm deep up to 64.5 mrad: of those to +-64, with one more on either side.
+
+    Along the flat the centre falls by l^2/(8 r), but for its ends, which are smoothed.
+    """
+    half, away = 0.03 / RADIUS, 2e-3 * np.arange(-60, 61)
+    heights = np.minimum(RADIUS * (np.cos(half) / np.cos(away) - 1.0), 0.0)
+    read = {"angles": tuple(middle + away), "heights": tuple((h, h) for h in heights)}
+    part = Sections(type="sections", positions=(-0.04, 0.04), **read)
+    tables = Tables([part], RADIUS, round_rail(0.3), 0.75)
+    assert tables.surface_row[0, 6] == pytest.approx(RADIUS * 0.132, rel=1e-9)
+    assert -tables.at(middle)[0] == pytest.approx(0.06**2 / 8.0 / RADIUS, rel=0.01)
+    for beside in (-1.5 * half, 1.5 * half):
+        assert tables.at(middle + beside)[0] == pytest.approx(0.0, abs=5e-8)
+
+
 def test_fresh_flat_is_a_chord():
     """Depth l^2/(8 r) in the middle, contact half a length away, nothing beyond its ends."""
     flat = Flat(type="flat", length=0.06, angle=1.0)
