@@ -110,7 +110,7 @@ CHANGE_WITHIN = 1e-3
 GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
 # 1/s, growth up to which a vehicle is below its critical speed: bodies that nothing holds have none
 NEUTRAL = 1e-3
-_NEVER = 1 << 40
+NEVER = 1 << 40  # steps: a row every so many is none
 # of a map before the norms of its powers are looked at, of these, and the least norm of a square
 # that is no round-off; squarings from which on a lower bound need not be ln 2 to be taken, and the
 # least mean of a diagonal over its norm that is none
@@ -335,7 +335,7 @@ def _step_growth(
     arrays = system, work_arrays(system)
     arrays[1].watch[IMPLICIT] = implicit
     rest = np.zeros_like(state), np.zeros((3, len(state))), empty_recorder(model, 1)
-    one = SCHEMES[scheme], h, Chunk(1, 1, _NEVER)
+    one = SCHEMES[scheme], h, Chunk(1, 1, NEVER)
 
     def after_step(trials: Floats) -> Floats:
         after = trials.copy()

@@ -13,7 +13,7 @@ from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.model.assembly import Model
-from railsim.model.time_step import divide_strikes, empty_recorder
+from railsim.model.time_step import NEVER, divide_strikes, empty_recorder
 from railsim.model.work import work_arrays
 
 # called with the time that has been simulated, and all of it [s]; it may raise, as on Ctrl-C
@@ -95,7 +95,7 @@ def advance(
             recorder,
             scheme,
             step,
-            Chunk(1 + done, min(most, steps - done), steps + 2, fresh=int(done == 0)),
+            Chunk(1 + done, min(most, steps - done), NEVER, fresh=int(done == 0)),
         )
         done += more
         if progress is not None:

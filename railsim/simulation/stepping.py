@@ -26,7 +26,7 @@ from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.laws import allowed
 from railsim.model.control import check_command
-from railsim.model.time_step import divide_strikes
+from railsim.model.time_step import NEVER, divide_strikes
 from railsim.model.work import work_arrays
 from railsim.notation import REQUESTED
 from railsim.profiles import Profile
@@ -39,7 +39,6 @@ from railsim.simulation.preparation import begin
 from railsim.simulation.run_progress import Progress, RunProgress
 from railsim.simulation.step_choice import duration as time_for
 
-NEVER = 1 << 40
 SHORTEST = 1e-12  # s
 SHARE = 1e-3  # of a step: what is shorter is made up for by the next one
 

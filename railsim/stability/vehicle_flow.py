@@ -17,6 +17,7 @@ from railsim.kernels.support import DOF, LEARNT
 from railsim.kernels.time_loop import Chunk
 from railsim.linear.circle import POSITION
 from railsim.model.equilibrium import tracks_under
+from railsim.model.time_step import NEVER
 from railsim.model.work import CONSTANT_SPEED
 from railsim.processes import available_cores
 from railsim.stability.motion import LeftRange, VehicleMotion
@@ -96,7 +97,7 @@ class VehicleFlow:
                 full = self.full(states[k], float(speeds[k]))
                 with suppress(LeftRange):
                     step = float(durations[k]) / steps
-                    motion.advance(self._system, full, step, Chunk(1, steps, 1 << 40))
+                    motion.advance(self._system, full, step, Chunk(1, steps, NEVER))
                     ends[k] = self.reduce(full)
 
         threads = self._threads[: len(states)]

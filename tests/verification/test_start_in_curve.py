@@ -11,13 +11,16 @@ import railsim
 from railsim.constants import GRAVITY
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle.flatten import flatten
+from railsim.kernels import state as state_columns
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.status import RUNNING
+from railsim.kernels.time_loop import RK4, time_loop
 from railsim.linear.steady import NotConverged
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.work import work_arrays
-from railsim.simulation import run_in
+from railsim.simulation import auxiliary_track, run_in
 from railsim.stability import curving as stability_curving
 
 STEADY = Settings(start_state="steady")
@@ -157,6 +160,32 @@ def test_mean_of_a_vehicle_that_does_not_come_to_rest_in_a_curve(monkeypatch):
     beyond = square / radius * np.cos(phi) / 9.81 - np.sin(phi)
     weight = railsim.static_loads(wagon).Q0.sum()
     assert -found.sum_Y.sum() == pytest.approx(beyond * weight, rel=0.02)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3, 7])
+def test_a_way_of_any_number_of_steps_takes_each_of_them_and_records_none(steps, monkeypatch):
+    """There is room for one record; a row at every second of three steps would be beyond it."""
+    taken = []
+
+    def loop(*arguments):
+        chunk = arguments[-1]
+        numbers = range(chunk.first, chunk.first + chunk.steps)
+        assert chunk.every > numbers[-1]  # its numbers begin with 1
+        assert bool(chunk.fresh) == (chunk.first == 1)
+        taken.extend(numbers)
+        return time_loop(*arguments)
+
+    monkeypatch.setattr(auxiliary_track, "time_loop", loop)
+    track = railsim.load_track("straight")
+    balance = equilibrium(assemble(load_vehicle("coach_manchester"), track, Settings()), SPEED)
+    monkeypatch.setattr(auxiliary_track, "WHEELSET_STEPS", 4 * 3)  # calls of three steps
+    state = balance.state.copy()
+    state[state_columns.SPEED] = SPEED
+    begin = state[state_columns.ARC_LENGTH]
+    way = balance.model, balance.model.system, state, 1e-3, steps, RK4
+    assert auxiliary_track.advance(*way) == RUNNING
+    assert taken == list(range(1, steps + 1))
+    assert state[state_columns.ARC_LENGTH] - begin == pytest.approx(SPEED * 1e-3 * steps)
 
 
 @pytest.mark.parametrize("start", ["run-in", "steady"])
