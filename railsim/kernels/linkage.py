@@ -57,7 +57,7 @@ STATUS = {
 
 ITERATIONS = 40
 CLOSE = 1e-9  # a Newton step below this share of the size leaves an error of its square
-SMALLEST_STEP = 1e-9  # share of the driver's range
+SMALLEST_STEP = 1e-7  # share of the driver's range: in `CLOSE` branches that meet are alike
 TRANSITION = 1e-3  # share of the size by which arcs with given centres may miss each other
 BEYOND = 1e-3  # share of the driver's range at which a failure is looked at from behind it
 

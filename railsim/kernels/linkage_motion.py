@@ -138,7 +138,7 @@ def predict(linkage, h, now, v, a, new):
 
 @compiled(python=False)
 def correction_of(linkage, h, now, v, a, new):
-    """Largest difference of the pose `new` from the predicted one."""
+    """Largest difference of `new` from the pose, or from its derivatives, as predicted."""
     largest = 0.0
     for k in range(1, linkage.n_bodies + 1):
         for m in range(3):
@@ -155,7 +155,8 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
     """Positions and derivatives for all values of the driver, on one branch.
 
     Newton's method from the second-order prediction; a step is halved while the correction is
-    large against the step or the determinant changes its sign.
+    large against the step, the determinant changes its sign, or the derivatives differ from those
+    predicted by more than three times that: of branches that have just met, positions are alike.
 
     Parameters
     ----------
@@ -185,7 +186,8 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
     pivots, x = np.zeros(n, dtype=np.int64), np.zeros(n)
     one, two = np.zeros(4), np.zeros(4)
     now, v_now, a_now = start.copy(), np.zeros((nb + 1, 3)), np.zeros((nb + 1, 3))
-    new, arc, arc_new = start.copy(), arc_start.copy(), arc_start.copy()
+    new, v_new, a_new = start.copy(), np.zeros((nb + 1, 3)), np.zeros((nb + 1, 3))
+    none, arc, arc_new = np.zeros((nb + 1, 3)), arc_start.copy(), arc_start.copy()
     sign = settle(linkage, arc, now, s[0], Phi, J, pivots, one, two)
     failure[0] = s[0]
     if sign < -1.5:
@@ -198,12 +200,10 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
     for i in range(1, s.shape[0]):
         reach = max(reach, abs(s[i] - s[0]))
     at = s[0]
+    derivatives(linkage, arc, now, J, pivots, x, v_now, a_now, one, two)
     for i in range(s.shape[0]):
         step = s[i] - at
-        while True:
-            derivatives(linkage, arc, now, J, pivots, x, v_now, a_now, one, two)
-            if at == s[i]:
-                break
+        while at != s[i]:
             rest = s[i] - at
             h = rest if abs(step) >= abs(rest) else step
             speed = predict(linkage, h, now, v_now, a_now, new)
@@ -212,23 +212,25 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
             target = s[i] if h == rest else at + h
             sign_new = settle(linkage, arc_new, new, target, Phi, J, pivots, one, two)
             correction = correction_of(linkage, h, now, v_now, a_now, new)
-            allowed = 0.2 * speed + 1e-9
+            allowed = 0.2 * speed
             for k in range(arc.shape[0]):
                 if arc_new[k] != arc[k]:
                     allowed += TRANSITION
-            smooth = correction <= allowed and speed < 0.5
-            if sign_new == sign and smooth:
+            smooth = sign_new == sign and correction <= allowed + 1e-9 and speed < 0.5
+            if smooth:
+                derivatives(linkage, arc_new, new, J, pivots, x, v_new, a_new, one, two)
+                change = abs(h) * correction_of(linkage, h, v_now, a_now, none, v_new)
+                smooth = change <= 3.0 * allowed
+            if smooth:
                 at = target
                 step = 2.0 * h
                 for k in range(nb + 1):
                     for m in range(3):
-                        now[k, m] = new[k, m]
+                        now[k, m], v_now[k, m], a_now[k, m] = new[k, m], v_new[k, m], a_new[k, m]
                 for k in range(arc.shape[0]):
                     arc[k] = arc_new[k]
                 continue
             step = 0.5 * h
-            constraints(linkage, 0, arc, now, at, Phi, J, one, two)
-            factor(J, pivots, n)
             if abs(step) < SMALLEST_STEP * reach:
                 beyond = at + BEYOND * reach * np.sign(h)
                 failure[0] = at

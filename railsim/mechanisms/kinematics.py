@@ -209,8 +209,8 @@ def _fault(model: Model, tracked: _Tracked, s: Floats, pose: Floats) -> Fault:
 def driver_words(model: Model, value: float) -> str:
     """A value of the driver with its unit."""
     if model.definition.driver.angle is not None:
-        return f"{np.degrees(value):.4f} deg"
-    return f"{value * 1e3:.3f} mm"
+        return f"{np.degrees(value):z.4f} deg"
+    return f"{value * 1e3:z.3f} mm"
 
 
 def check_freedom(model: Model) -> None:
