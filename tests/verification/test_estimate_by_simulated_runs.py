@@ -116,7 +116,7 @@ def test_sizes_of_errors_are_those_of_the_data():
     kinds = np.tile([true_contact[0], true_contact[1], true_contact[1], true_contact[0]], wheelsets)
     fields = drawn(np.hstack([powers.track, powers.unknown * kinds]))
     data = np.einsum("kcf,kf->kc", response, fields)
-    data += drawn(powers.white + true_model**2 * powers.own)
+    data += drawn(powers.white + true_model**2 * powers.signal)
     found = likely_sizes(powers, np.sqrt(powers.points) * data.T)
     assert found.model == pytest.approx(true_model, rel=0.3)
     assert found.contact == pytest.approx(true_contact, rel=0.35)

@@ -47,8 +47,10 @@ MASSES = {  # t, sums of the sources' tables
 }
 # km/h at which the sources say that a vehicle runs stably, or 110 % of its admissible speed
 STABLE = {"coach_25t": 176.0, "coach_zhai_high_speed": 250.0}
-# Friction holds them: linear analysis, in which it sticks, says little about their stability.
-FRICTION = ("wagon_",)
+# Friction holds wagons: linear analysis, in which it sticks, says little about their stability.
+# Cooperrider's bogie hunts from 39 m/s on, with the source's friction of 0.15 from 44 m/s: below
+# the admissible speed, which is assumed.
+LEFT_OUT = ("wagon_", "cooperrider_")
 
 
 def mass(flat):
@@ -107,7 +109,7 @@ def test_mass_is_the_sum_of_the_source(name):
     assert 1e-3 * mass(flatten(load_vehicle(name))) == pytest.approx(MASSES[name], abs=0.05)
 
 
-@points("name", [n for n in library_files("vehicle") if not n.startswith(FRICTION)], always=(4, 13))
+@points("name", [n for n in library_files("vehicle") if not n.startswith(LEFT_OUT)], always=(4, 13))
 @pytest.mark.usefixtures("small_contact_tables")
 def test_stable_at_110_per_cent_of_the_admissible_speed(name):
     """S1002 on 60E1 1:40, friction 0.4, lateral amplitudes of 3 mm: every oscillation decays."""
