@@ -45,10 +45,12 @@ if TYPE_CHECKING:
     from railsim.measurement import Measurement, load_measurement
     from railsim.model.statics import StaticLoads, static_loads
     from railsim.profiles import Profile, load_profile
+    from railsim.report.write import write_report
     from railsim.result import Result, mid_curves, open_result, peaks
     from railsim.simulation import Simulation, simulate, simulate_together
     from railsim.stability.critical_speed import critical_speed
     from railsim.stability.curving import curving
+    from railsim.studies.gathered import open_study
     from railsim.studies.optimise import optimise
     from railsim.studies.study import study
 
@@ -73,11 +75,13 @@ _HOMES = {
     "load_spring": "railsim.definitions.loading", "load_track": "railsim.definitions.loading",
     "load_vehicle": "railsim.definitions.loading", "mid_curves": "railsim.result",
     "modes": "railsim.linear.modes", "open_result": "railsim.result",
+    "open_study": "railsim.studies.gathered",
     "optimise": "railsim.studies.optimise", "peaks": "railsim.result",
     "root_locus": "railsim.linear.modes", "sensitivity": "railsim.identification",
     "simulate": "railsim.simulation", "simulate_together": "railsim.simulation",
     "static_loads": "railsim.model.statics", "study": "railsim.studies.study",
     "validate_model": "railsim.assessment.model_validation",
+    "write_report": "railsim.report.write",
 }  # fmt: skip
 
 __all__ = [
@@ -86,9 +90,9 @@ __all__ = [
     "StaticLoads", "Track", "TrailingArmSuspension", "Vehicle", "__version__", "animate", "assess",
     "critical_speed", "curving", "describe", "identify", "load_comfort_limits", "load_measurement",
     "load_mechanism", "load_profile", "load_running_limits", "load_scenario", "load_settings",
-    "load_spring", "load_track", "load_vehicle", "mid_curves", "modes", "open_result", "optimise",
-    "peaks", "root_locus", "sensitivity", "simulate", "simulate_together", "static_loads", "study",
-    "validate_model",
+    "load_spring", "load_track", "load_vehicle", "mid_curves", "modes", "open_result", "open_study",
+    "optimise", "peaks", "root_locus", "sensitivity", "simulate", "simulate_together",
+    "static_loads", "study", "validate_model", "write_report",
 ]  # fmt: skip
 
 

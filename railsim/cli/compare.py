@@ -1,26 +1,21 @@
 """``railsim compare``: results side by side."""
 
-import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from railsim.cli import common as cli
-from railsim.errors import InputError, input_error
+from railsim.errors import InputError
 
 if TYPE_CHECKING:
     from railsim.compare import Difference
-    from railsim.result import Result
+    from railsim.studies.comparable import Group
 
 FILES = ("compare.csv", "compare.json", "compare.png", "differences.png")
-MOST = 8  # results in one picture
 SEEDS = (
     "the irregularities are random: peaks differ from seed to seed too, often by more than those "
     "of vehicles; runs with several values of track.irregularities.0.seed show by how much"
 )
-
-Group = dict[str, "Result"]
 
 
 @click.command()
@@ -51,12 +46,15 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
         conditions,
         difference_table,
     )
+    from railsim.studies.comparable import comparable
 
     if output.folder is not None:  # a picture is drawn: matplotlib takes long to import
         from railsim.plot.overlay import difference_figure, overlay
 
     cli.goes_with("--out", output.folder, "over")
-    groups = _groups(files, output)
+    groups, remarks = comparable(files)
+    for remark in remarks:
+        output.remark(remark)
     output.reserve(*(_file_name(name, title) for title in groups for name in FILES))
     tracks = [result.track() for results in groups.values() for result in results.values()]
     random = any(one.type == "random" for track in tracks for one in track.irregularities)
@@ -108,75 +106,7 @@ def _file_name(name: str, title: str) -> str:
     return f"{stem}_{in_a_name(title)}.{ending}" if title else name
 
 
-def _groups(files: tuple[str, ...], output: cli.Output) -> dict[str, Group]:
-    """Return what is compared with each other, by titles; a single group has none.
-
-    Raises InputError: what cannot be compared, with the reason.
-    """
-    from railsim.studies.gathered import open_results
-
-    folders = [file for file in files if os.path.isdir(file)]
-    if not folders:
-        results = open_results([Path(file) for file in files])
-        if len(files) < 2:
-            raise input_error("R2.h5", "one result", "give two results at least")
-        return {"": results}
-    if len(folders) < len(files):
-        found = f"results and folders together ({folders[0]})"
-        raise input_error("R.h5|STUDY", found, "results, or folders of studies")
-    groups = _in_folder(folders[0]) if len(folders) == 1 else _in_folders(folders, output)
-    crowded = [title for title, group in groups.items() if len(group) > MOST]
-    if crowded:
-        found = f"{len(groups[crowded[0]])} results side by side"
-        raise input_error(crowded[0], found, f"{MOST} at most; give the files")
-    return groups if len(groups) > 1 else {"": next(iter(groups.values()))}
-
-
-def _in_folder(folder: str) -> dict[str, Group]:
-    """Return the runs of a folder that differ in nothing but the vehicle."""
-    from railsim.studies.gathered import gather
-
-    found = gather([folder])
-    alike: dict[str, dict[str, Path]] = {}
-    for record in found.records:
-        if record["name"] in found.paths:
-            vehicle = str(record["labels"].get("vehicle", record["name"]))
-            rest = record["name"].removeprefix(f"{vehicle}_")
-            alike.setdefault(rest, {})[vehicle] = found.paths[record["name"]]
-    pairs = {title: _results(paths) for title, paths in alike.items() if len(paths) > 1}
-    if not pairs:
-        why = "no two runs differ in nothing but the vehicle" if found.paths else "no result files"
-        allowed = "give the result files that are to be compared; `railsim plot` shows a study"
-        raise input_error(folder, why, allowed)
-    return pairs
-
-
-def _in_folders(folders: list[str], output: cli.Output) -> dict[str, Group]:
-    """Return the runs of the same name in several folders."""
-    from railsim.studies.gathered import gather
-
-    runs = {folder: gather([folder]).paths for folder in folders}
-    common = [name for name in runs[folders[0]] if all(name in paths for paths in runs.values())]
-    if not common:
-        found = "no result that all folders have"
-        raise input_error(folders[0], found, "studies with runs of the same names")
-    for folder, paths in runs.items():
-        if alone := [name for name in paths if name not in common]:
-            more = ", ..." if len(alone) > 1 else ""
-            output.remark(f"{len(alone)} runs of {folder} are not in all folders: {alone[0]}{more}")
-    stems = [Path(folder).name for folder in folders]
-    labels = stems if len(set(stems)) == len(stems) else folders
-    labelled = dict(zip(labels, runs.values(), strict=True))
-    return {run: _results({n: paths[run] for n, paths in labelled.items()}) for run in common}
-
-
-def _results(paths: dict[str, Path]) -> Group:
-    from railsim.result import open_run
-
-    return {label: open_run(path) for label, path in paths.items()}
-
-
-def _differing(results: Group) -> "tuple[list[Difference], list[str]]":
+def _differing(results: "Group") -> "tuple[list[Difference], list[str]]":
     """Return differences along the track, or why there are none."""
     from railsim.compare import differences
     from railsim.plot.selection import STUDY

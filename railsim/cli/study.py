@@ -148,10 +148,10 @@ def command(
         how |= {"resume": resume, "on_record": on_record, "further_files": beside, **studying}
         outcome = run_study(spec, folder, Execution(**how))
         if report:
-            from railsim.cli.report import write_report
+            from railsim.report.write import write_report
 
             output.written.append(outcome.folder / "report.html")
-            write_report([str(outcome.folder)], output.written[0])
+            write_report([outcome.folder], output.written[0], overwrite=True)
     if not output.as_json:
         lines.end()
         for key in () if output.quiet else outcome.without_effect():
@@ -205,10 +205,10 @@ def _campaign(
         outcome = campaign(scenario, list(vehicles), out=str(output.out), **studying, **how)
     write_assessments(output, outcome.assessments)
     if report:
-        from railsim.cli.report import write_report
+        from railsim.report.write import write_report
 
-        page = Path(outcome.folder, "report.html")
-        write_report([str(outcome.folder)], page, assessments=outcome.assessments)
+        page, assessments = Path(outcome.folder, "report.html"), outcome.assessments
+        write_report([outcome.folder], page, assessments=assessments, overwrite=True)
         output.written.append(page)
     if not output.as_json:
         lines.end(remarks=False)  # the assessments repeat them

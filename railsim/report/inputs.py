@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any
 
 from markupsafe import Markup
 
@@ -10,7 +10,6 @@ from railsim.compare import differing, flat_keys
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import track_remarks
-from railsim.definitions.units_of_keys import unit_of_input
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.description.rest import rest_frequencies
 from railsim.errors import InputError, ModelError
@@ -18,9 +17,10 @@ from railsim.model.statics import static_loads
 from railsim.profiles import Profile
 from railsim.report.document import Drawing, Section, Table, page_table
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
-from railsim.report.spread import number
 from railsim.result import Results
 from railsim.simulation.assumptions import assumptions
+from railsim.studies.columns import number
+from railsim.studies.inputs import Inputs
 from railsim.text import in_words, printable
 from railsim.units import number_with_unit
 
@@ -30,34 +30,6 @@ MOST_AT_REST = 3  # vehicles
 MOST_ASSUMED = 4  # pairs of a vehicle and a track
 MOST_VALUES = 3  # of an assumption in runs of one vehicle on one track
 MOST_DIFFERENCES = 40  # keys in which the vehicles differ
-
-
-class Inputs(NamedTuple):
-    """Inputs of a run, with the labels of the study: two files may hold vehicles of one name."""
-
-    vehicle_label: str
-    track_label: str
-    vehicle: Vehicle
-    track: Track
-    settings: Settings
-    speed: float
-
-
-def inputs_of(records: Sequence[Record], results: Results) -> list[Inputs]:
-    """Return the inputs of results."""
-    labels = {record["name"]: record["labels"] for record in records}
-    run_inputs = []
-    for name, result in results.items():
-        texts, vehicle, track = labels.get(name, {}), result.vehicle(), result.track()
-        names = (str(texts.get("vehicle", vehicle.name)), str(texts.get("track", track.name)))
-        run_inputs.append(Inputs(*names, vehicle, track, result.settings(), result.speed))
-    return run_inputs
-
-
-def units_of(records: Sequence[Record], runs: Sequence[Inputs]) -> dict[str, str]:
-    """Return the units of what was varied, by the labels of the runs."""
-    keys = dict.fromkeys(label for record in records for label in record["labels"] if "." in label)
-    return {key: next(filter(None, (unit_of_input(one, key) for one in runs)), "") for key in keys}
 
 
 def _assumed(runs: Sequence[Inputs], whole: str) -> Table:

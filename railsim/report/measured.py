@@ -64,7 +64,7 @@ class Part:
     method: Sequence[str]
 
 
-def measured_page(parts: Sequence[Part], title: str | None = None) -> str:
+def measured_page(parts: Sequence[Part], title: str = "") -> str:
     """Return the page about comparisons of models with tests, identifications and wear."""
     alone = len(parts) == 1
     sections = []

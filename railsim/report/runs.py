@@ -23,10 +23,12 @@ from railsim.plot.assessment import assessment_figure
 from railsim.report import document as doc
 from railsim.report import spread
 from railsim.report.curves import cells_of, curve_data, groups
-from railsim.report.inputs import Inputs, inputs_of, inputs_section, units_of
+from railsim.report.inputs import inputs_section
 from railsim.report.limits import assess_runs, remark_table
 from railsim.report.published import published_comparisons
 from railsim.result import Results
+from railsim.studies.columns import WORDS, columns, parameters
+from railsim.studies.inputs import Inputs, inputs_of, units_of
 from railsim.text import printable
 from railsim.version import __version__
 
@@ -151,7 +153,7 @@ def _peaks(records: Sequence[Record], results: Results) -> doc.Section:
         wheelsets = results[record["name"]].wheelsets
         for peak in record["peaks"]:
             quantity = QUANTITIES[peak["quantity"]]
-            words = f"{quantity.words}, {spread.WORDS[peak['kind']]}"
+            words = f"{quantity.words}, {WORDS[peak['kind']]}"
             row = rows.setdefault((quantity.name, peak["kind"]), [words])
             row += [""] * (1 + number - len(row))
             wheelset = peak.get("wheelset", "")
@@ -228,10 +230,10 @@ def _spread(
     units: Mapping[str, str],
 ) -> doc.Section:
     """Table of all runs, and what their values depend on."""
-    done, varied = _with_values(records), spread.parameters(records, units)
+    done, varied = _with_values(records), parameters(records, units)
     data["spread"] = {
         "parameters": varied,
-        "columns": spread.columns(records),
+        "columns": columns(records),
         "runs": [
             {
                 "name": printable(str(record["name"])),

@@ -14,6 +14,10 @@
 `carry_out.py`       `carry_out`: which runs are done; computes the missing ones, with the journal
 `outcome.py`         `Outcome`: summary and results of a folder
 `gathered.py`        runs from result files and from folders of studies
+`comparable.py`      which results are compared with each other
+`columns.py`         what runs have, by column: parameters that differ, values of the summary
+`inputs.py`          vehicles, tracks and settings of runs, and units of what was varied
+`picture.py`         the picture of a study: values over what was varied
 `analyses.py`        analyses at a point besides a run: curving, critical speed, modes
 `optimise.py`        `optimise`: objectives, constraints, the design that is chosen
 `designs.py`         designs evaluated by a study

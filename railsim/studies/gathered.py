@@ -9,14 +9,17 @@ from typing import Any
 
 from railsim.description import Description
 from railsim.description.values import short
-from railsim.errors import Fault, Faults
+from railsim.errors import Fault, Faults, input_error
 from railsim.files.access import folder_of
 from railsim.result import Result, open_run
 from railsim.result.extremes import run_facts
 from railsim.studies.journal import JOURNAL, Journal, Records
+from railsim.studies.outcome import Outcome
 from railsim.studies.records import Record
 from railsim.studies.summary import read_index
 from railsim.table import Table
+
+ALLOWED = "the folder of a study, or one with .h5 files"
 
 
 @dataclass
@@ -81,8 +84,7 @@ def gather(files: Sequence[str]) -> Gathered:
         with faults.caught():
             records, inputs = _of_folder(path) if os.path.isdir(path) else ([_of_file(path)], {})
             if not records:
-                allowed = "the folder of a study, or one with .h5 files"
-                faults.append(Fault(file, "", "no results in this folder", allowed))
+                faults.append(Fault(file, "", "no results in this folder", ALLOWED))
             gathered.inputs = inputs if len(files) == 1 else {}
             batches.append((path if os.path.isdir(path) else path.parent, records))
     runs = [(folder, record["name"]) for folder, records in batches for record in records]
@@ -98,6 +100,21 @@ def gather(files: Sequence[str]) -> Gathered:
         before = before if folders[before] == 1 else str(folder)
         _add(gathered, records, folder, {name: f"{before}/{name}" for name in alike})
     return gathered
+
+
+def open_study(folder: str | Path) -> Outcome:
+    """Open the folder of a study that has ended or was interrupted, or any folder of results.
+
+    Raises InputError: it holds no results, or cannot be read.
+
+    >>> import railsim
+    >>> railsim.open_study("curves").plot("Y_over_Q_abs")  # doctest: +SKIP
+    """
+    place = Path(folder)
+    records = _of_folder(place)[0]
+    if not records:
+        raise input_error(str(folder), "no results in this folder", ALLOWED)
+    return Outcome(place, Records(place / JOURNAL, records), 0)
 
 
 def described_runs(file: str) -> Description:

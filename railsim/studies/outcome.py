@@ -16,6 +16,7 @@ from railsim.studies.summary import summary_row, unit_of
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.figure import Figure
 
 MOST_COMPARED = 2000  # runs
 
@@ -74,6 +75,28 @@ class Outcome:
             for record in self.records
             if record["status"] not in NOT_DONE and record["file"]
         }
+
+    def plot(
+        self,
+        *quantities: str,
+        against: str | None = None,
+        family: str | None = None,
+        kind: str | None = None,
+        path: str | Path | None = None,
+        overwrite: bool = False,
+    ) -> "Figure":
+        """Draw values of the summary over what was varied, as ``railsim plot``; see `study_figure`.
+
+        `path`: Where the picture is written too; the suffix tells its kind. `overwrite`: Whether a
+        file may be replaced.
+        """
+        from railsim.plot.style import save
+        from railsim.studies.picture import study_figure
+
+        figure = study_figure(self.folder, quantities, against=against, family=family, kind=kind)
+        if path is not None:
+            save(figure, path, overwrite=overwrite)
+        return figure
 
     def to_dataframe(self) -> "pandas.DataFrame":
         """Return the summary, one row per run, as a `pandas.DataFrame` [SI].

@@ -39,16 +39,18 @@ from railsim.report.curves import (
 )
 from railsim.report.document import Drawing, Section, day
 from railsim.report.drawings import track_svg
-from railsim.report.inputs import _settings, inputs_of, inputs_section
+from railsim.report.inputs import _settings, inputs_section
 from railsim.report.limits import assess_runs
 from railsim.report.measured import Part, as_section
 from railsim.report.published import published_comparisons, reading
 from railsim.report.runs import _lead, _peaks, page
-from railsim.report.spread import columns, command, parameters, spread_rows, worst_rows, worst_runs
+from railsim.report.spread import command, spread_rows, worst_rows, worst_runs
 from railsim.result import Hdf5Sink, peaks
 from railsim.result.export import selected
 from railsim.result.extremes import run_facts
+from railsim.studies.columns import columns, parameters
 from railsim.studies.gathered import gather
+from railsim.studies.inputs import inputs_of
 from railsim.table import Column, Table
 from railsim.text import in_words
 

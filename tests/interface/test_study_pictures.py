@@ -17,10 +17,10 @@ import railsim
 import railsim.studies.case
 import railsim.studies.gathered
 from railsim.cli import main
-from railsim.cli.plot import _combine, _study_figure
 from railsim.compare import differences
 from railsim.plot.study import Column, curves_figure, map_figure, ranking_figure
 from railsim.studies.gathered import Gathered
+from railsim.studies.picture import _combine, study_figure
 
 SPEEDS = [10.0, 12.0]
 
@@ -52,12 +52,12 @@ def test_study_is_drawn(folder, capsys, chosen):
 
 def test_medians_mix_no_vehicles_and_say_what_else(folder):
     """A curve for each vehicle and track; the friction is in the bands, and that is said."""
-    figure = _study_figure(str(folder), ("Y_peak",), None, None, None)
+    figure = study_figure(folder, ("Y_peak",))
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [
         "coach_flexicoil", "coach_manchester"
     ]  # fmt: skip
     assert "Not told apart: track.friction (options" in figure.get_suptitle()
-    by_friction = _study_figure(str(folder), ("Y_peak",), None, "track.friction", None)
+    by_friction = study_figure(folder, ("Y_peak",), family="track.friction")
     assert "Not told apart: vehicle (options" in by_friction.get_suptitle()
     both = _combine([Column("Vehicle", ["a", "b"]), Column("Track", ["t", "u"])])
     assert (both.words, both.values) == ("Vehicle, Track", ["a, t", "b, u"])
@@ -77,10 +77,10 @@ def test_the_axis_is_the_parameter_of_most_values_but_words_and_seeds(tmp_path, 
     def across(*without):
         for row in labels:
             row.update(dict.fromkeys(without, 0))
-        figure = _study_figure(str(tmp_path), (), None, None, "curves")
+        figure = study_figure(tmp_path, kind="curves")
         return {axes.get_xlabel() for axes in figure.axes}
 
-    monkeypatch.setattr(railsim.studies.gathered, "gather", lambda _: Gathered(records))
+    monkeypatch.setattr(railsim.studies.picture, "gather", lambda _: Gathered(records))
     assert across() == {"speed (m/s)"}
     assert across("speed") == {"friction"}
     assert across("track.friction") == {"vehicle"}
@@ -96,7 +96,7 @@ def test_seeds_are_no_axis(speeds, tmp_path, monkeypatch):
     rails = 'track.irregularities=[{type="random", spectrum="erri_b176_low"}]'
     railsim.study(COACH, CURVE, speeds, out=tmp_path / "s", workers=1, assignments=[rails],
                   grid={"track.irregularities.0.seed": [1, 2, 3]})  # fmt: skip
-    figure = _study_figure(str(tmp_path / "s"), (), None, None, None)
+    figure = study_figure(tmp_path / "s")
     labels = {axes.get_xlabel() for axes in figure.axes}
     assert ("speed (m/s)" in labels) == (len(speeds) > 1)
     assert not any("seed" in words for words in labels)
@@ -113,7 +113,7 @@ def test_words_and_seeds_are_axes_if_asked_for(chosen, across, tmp_path, monkeyp
     rails = 'track.irregularities=[{type="random", spectrum="erri_b176_low"}]'
     railsim.study([COACH, "coach_flexicoil"], CURVE, 10.0, out=tmp_path, workers=1,
                   assignments=[rails], grid={"track.irregularities.0.seed": [1, 2]})  # fmt: skip
-    figure = _study_figure(str(tmp_path), ("Q_peak",), *chosen, None)
+    figure = study_figure(tmp_path, ("Q_peak",), against=chosen[0], family=chosen[1])
     assert {axes.get_xlabel() for axes in figure.axes} == {across}
 
 
@@ -131,13 +131,34 @@ def test_what_the_study_lacks_is_refused(folder, capsys, chosen, words):
     assert not (folder / "study.png").exists()
 
 
+def test_python_draws_and_reports_what_the_command_does(folder, tmp_path, capsys):
+    """A folder that is opened again gives the summary, the picture and the page of the command."""
+    outcome = railsim.open_study(folder)
+    speeds = outcome.to_dataframe()["speed"]
+    assert (sorted(set(speeds)), len(outcome.results())) == (SPEEDS, len(speeds))
+    chosen = {"against": "track.friction", "family": "speed"}
+    path = tmp_path / "s.svg"
+    figure = outcome.plot("Y_over_Q_abs", **chosen, path=path)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert (texts, path.exists()) == (["10", "12"], True)
+    with pytest.raises(railsim.InputError, match="against: 'friction' was not varied"):
+        outcome.plot(against="friction")
+    page = railsim.write_report([folder], tmp_path / "python.html")
+    assert main(["report", str(folder), "--out", str(tmp_path / "command.html")]) == 0
+    assert page.read_text() == (tmp_path / "command.html").read_text()
+    with pytest.raises(railsim.InputError, match="exists"):
+        railsim.write_report([folder], page)
+    with pytest.raises(railsim.InputError, match="no results in this folder"):
+        railsim.open_study(tmp_path / "none")
+
+
 def test_medians_over_a_full_curve_are_called_as_in_the_summary(folder):
     """Not the values at its middle, which the summary calls `_mid`."""
     with open(folder / "summary.csv", encoding="utf-8") as stream:
         runs = list(csv.DictReader(stream))
     medians = [1e-3 * float(run["Q_median (N)"]) for run in runs]
     for name in ("Q_median", "Q_mid1"):
-        figure = _study_figure(str(folder), (name,), None, None, "ranking")
+        figure = study_figure(folder, (name,), kind="ranking")
         (axes,) = figure.axes
         drawn = sorted(bar.get_width() for bar in axes.patches)
         assert drawn == pytest.approx(sorted(medians), rel=1e-5)
@@ -146,10 +167,10 @@ def test_medians_over_a_full_curve_are_called_as_in_the_summary(folder):
 @points("kind", ["curves", "map", "ranking"], always=(0,))
 def test_runs_that_ended_early_are_counted_above_the_picture(folder, kind):
     index = json.loads((folder / "study.json").read_text())
-    assert _study_figure(str(folder), (), None, None, kind).get_suptitle().count("early") == 0
+    assert study_figure(folder, kind=kind).get_suptitle().count("early") == 0
     index["runs"][0]["status"] = "derailed"
     (folder / "study.json").write_text(json.dumps(index))
-    figure = _study_figure(str(folder), (), None, None, kind)
+    figure = study_figure(folder, kind=kind)
     crosses = " (crosses)" if kind == "curves" else ""
     words = f"1 of 8 runs ended early{crosses}: their values until then"
     assert words in figure.get_suptitle().splitlines()
@@ -159,7 +180,7 @@ def test_runs_that_ended_early_are_counted_above_the_picture(folder, kind):
 
 @pytest.mark.parametrize("kind", ["curves", "map", "ranking"])
 def test_picture_of_a_study_says_what_it_is_called_and_what_all_its_runs_have(folder, kind):
-    title = _study_figure(str(folder), (), None, None, kind).get_suptitle()
+    title = study_figure(folder, kind=kind).get_suptitle()
     assert title.splitlines()[0] == f"s: {Path(CURVE).stem}"  # vehicle and speed were varied
 
 
@@ -167,7 +188,7 @@ def test_picture_of_a_study_says_what_it_is_called_and_what_all_its_runs_have(fo
 def test_what_was_varied_has_its_unit_without_results_too(tmp_path, simulated, file):
     masses = {"vehicle.carbody.mass": [3e4, 4e4]}
     railsim.study([COACH], CURVE, [10.0], grid=masses, keep="summary", out=tmp_path, workers=1)
-    figure = _study_figure(str(tmp_path / file), (), None, None, "curves")
+    figure = study_figure(tmp_path / file, kind="curves")
     assert "carbody.mass (kg)" in [axes.get_xlabel() for axes in figure.axes]
 
 
