@@ -38,18 +38,7 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
       railsim compare curves
       railsim compare before after --out changes
     """
-    from railsim.compare import (
-        compare,
-        comparison_table,
-        comparison_tables,
-        condition_table,
-        conditions,
-        difference_table,
-    )
     from railsim.studies.comparable import comparable
-
-    if output.folder is not None:  # a picture is drawn: matplotlib takes long to import
-        from railsim.plot.overlay import difference_figure, overlay
 
     cli.goes_with("--out", output.folder, "over")
     groups, remarks = comparable(files)
@@ -62,41 +51,58 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
         output.remark(SEEDS)
     records, parts = [], list[Any]()
     for title, results in groups.items():
-        rows = compare(results)
-        differing, why = _differing(results)
-        unlike = conditions(results)
-        record = {
-            "results": list(results),
-            "status": {label: result.status for label, result in results.items()},
-            "status_reason": {n: r.attributes.get("status_reason", "") for n, r in results.items()},
-            "compared_up_to": {n: float(r["distance"][-1]) for n, r in results.items()},
-            "remarks": {label: list(result.remarks) for label, result in results.items()},
-            "conditions": {key: dict(zip(results, unlike[key], strict=True)) for key in unlike},
-            "rows": [row.record() for row in rows],
-            "along_the_track": [one.record() for one in differing],
-        }
+        if title:
+            parts += [*[""] * bool(parts), title]
+        record, lines = _compare_group(title, results, over, output)
         records.append({"group": title, **record} if title else record)
+        parts += lines
+    output.answer(records[0] if list(groups) == [""] else {"groups": records}, parts)
+
+
+def _compare_group(
+    title: str, results: "Group", over: str, output: cli.Output
+) -> tuple[dict[str, Any], list[Any]]:
+    """Write what is compared with each other; return its record and the parts that are printed."""
+    from railsim.compare import (
+        compare,
+        comparison_table,
+        comparison_tables,
+        condition_table,
+        conditions,
+        difference_table,
+    )
+
+    rows, unlike = compare(results), conditions(results)
+    differing, why = _differing(results)
+    record = {
+        "results": list(results),
+        "status": {label: result.status for label, result in results.items()},
+        "status_reason": {n: r.attributes.get("status_reason", "") for n, r in results.items()},
+        "compared_up_to": {n: float(r["distance"][-1]) for n, r in results.items()},
+        "remarks": {label: list(result.remarks) for label, result in results.items()},
+        "conditions": {key: dict(zip(results, unlike[key], strict=True)) for key in unlike},
+        "rows": [row.record() for row in rows],
+        "along_the_track": [one.record() for one in differing],
+    }
+    if output.folder is not None:  # a picture is drawn: matplotlib takes long to import
+        from railsim.plot.overlay import difference_figure, overlay
+
         table, data, picture, differences = (_file_name(name, title) for name in FILES)
         output.write(table, comparison_table(rows))
         output.write(data, record)
-        output.write(picture, lambda group=results: overlay(group, over=over))
+        output.write(picture, overlay(results, over=over))
         if differing:
-            first = next(iter(results))
-            output.write(differences, lambda d=differing, of=first: difference_figure(d, of))
-        if title:
-            parts += [*[""] * bool(parts), title]
-        if unlike:
-            parts += [condition_table(unlike, results), ""]
-        for one in comparison_tables(rows, results):
-            parts += [one, ""]
-        for label, result in results.items():
-            if result.status != "complete":
-                ended = f"{result.status}: {result.attributes['status_reason']}"
-                parts.append(f"{label}: {ended}; compared up to s = {result['distance'][-1]:.1f} m")
-        for label, result in () if output.quiet else results.items():
-            parts += [f"{label}: remark: {remark}" for remark in result.remarks]
-        parts += [difference_table(differing)] if differing else why
-    output.answer(records[0] if list(groups) == [""] else {"groups": records}, parts)
+            output.write(differences, difference_figure(differing, next(iter(results))))
+    parts: list[Any] = [condition_table(unlike, results), ""] if unlike else []
+    for one in comparison_tables(rows, results):
+        parts += [one, ""]
+    for label, result in results.items():
+        if result.status != "complete":
+            ended = f"{result.status}: {result.attributes['status_reason']}"
+            parts.append(f"{label}: {ended}; compared up to s = {result['distance'][-1]:.1f} m")
+    for label, result in () if output.quiet else results.items():
+        parts += [f"{label}: remark: {remark}" for remark in result.remarks]
+    return record, parts + ([difference_table(differing)] if differing else why)
 
 
 def _file_name(name: str, title: str) -> str:

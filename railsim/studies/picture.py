@@ -44,38 +44,28 @@ def study_figure(
     by_key = columns(records)
     if not by_key:
         raise input_error(str(file), "no run has values", "a study with finished runs")
-    varied = _varied(file, gathered, records)
-    names, faults = _names(quantities, by_key), Faults()
-    for name in names:
-        if name not in by_key:
-            words, alike = "no such value in the study", nearest(name, by_key)
-            faults.append(argument_fault("quantities", name, words, alike, "QUANTITY"))
-    for parameter, key in (("against", against), ("family", family)):
-        if key and key not in varied:
-            words = f"'{key}' was not varied"
-            faults.append(argument_fault(parameter, "", words, nearest(key, varied)))
-    faults.check()
-    x = against or next((name for name in _by_use(varied) if name != family), None)
-    chosen = [_column(by_key[name]) for name in names]
+    names, varied = _names(quantities, by_key), _varied(file, gathered, records)
+    _check(names, by_key, {"against": against, "family": family}, varied)
+    ordered = sorted(varied, key=lambda name: _use(name, varied[name]))
+    x = against or next((name for name in ordered if name != family), None)
     if kind is None:
-        ordered = x and (against or family or (varied[x].numeric and not _is_seed(x)))
-        kind = "curves" if ordered else "ranking"
-    rest = [name for name in _by_use(varied) if name != x]
+        curves = x and (against or family or (varied[x].numeric and not _is_seed(x)))
+        kind = "curves" if curves else "ranking"
+    rest = [name for name in ordered if name != x]
     # what differs in kind is not mixed in one median
     parted = [name for name in ("vehicle", "track") if name in rest and kind == "curves"]
     members = [family] if family else parted or rest[:1]
+    chosen = [_column(by_key[name]) for name in names]
     early = [record["status"] != "complete" for record in records]
     if kind == "ranking" or x is None:
-        ends = [f" ({record['status']})" * (record["status"] != "complete") for record in records]
-        labels = [f"{record['name']}{end}" for record, end in zip(records, ends, strict=True)]
-        figure = ranking_figure(chosen, labels)
-    elif kind == "map":
-        if not members:
-            allowed = "a study over two parameters"
-            raise argument_error("kind", f"only '{x}' was varied", allowed, key="map")
+        figure = ranking_figure(chosen, [_label(record) for record in records])
+    elif kind == "curves":
+        figure = curves_figure(chosen, varied[x], _combine([varied[m] for m in members]), early)
+    elif members:
         figure = map_figure(chosen, varied[x], varied[members[0]])
     else:
-        figure = curves_figure(chosen, varied[x], _combine([varied[m] for m in members]), early)
+        allowed = "a study over two parameters"
+        raise argument_error("kind", f"only '{x}' was varied", allowed, key="map")
     mixed = [name for name in rest if name not in members]
     if mixed and kind != "ranking":
         say_above(figure, f"Not told apart: {', '.join(mixed)} (options: against, family)")
@@ -85,6 +75,30 @@ def study_figure(
         say_above(figure, f"{runs}: their values until then")
     say_above(figure, _common_title(folder_of(str(file)).resolve().name, records, varied))
     return figure
+
+
+def _check(
+    names: Sequence[str],
+    by_key: Collection[str],
+    parameters_of: Mapping[str, Text],
+    varied: Collection[str],
+) -> None:
+    """Refuse values that the study does not have, and parameters that were not varied."""
+    faults = Faults()
+    for name in names:
+        if name not in by_key:
+            words, alike = "no such value in the study", nearest(name, by_key)
+            faults.append(argument_fault("quantities", name, words, alike, "QUANTITY"))
+    for argument, key in parameters_of.items():
+        if key and key not in varied:
+            words = f"'{key}' was not varied"
+            faults.append(argument_fault(argument, "", words, nearest(key, varied)))
+    faults.check()
+
+
+def _label(record: Record) -> str:
+    status = record["status"]
+    return f"{record['name']}" + f" ({status})" * (status != "complete")
 
 
 def _names(quantities: Sequence[str], by_key: Collection[str]) -> list[str]:
@@ -102,13 +116,9 @@ def _varied(file: str | Path, gathered: Gathered, records: Sequence[Record]) -> 
     return {name: _column(column) for name, column in parameters(records, units).items()}
 
 
-def _by_use(varied: Mapping[str, Column]) -> list[str]:
-    """Parameters: numbers before words, most values first; seeds, which only name a track, last."""
-
-    def rank(name: str) -> tuple[bool, bool, int]:
-        return _is_seed(name), not varied[name].numeric, -len(varied[name].different)
-
-    return sorted(varied, key=rank)
+def _use(name: str, column: Column) -> tuple[bool, bool, int]:
+    """Return by what axes are chosen: numbers first, most values first; seeds only name a track."""
+    return _is_seed(name), not column.numeric, -len(column.different)
 
 
 def _is_seed(name: str) -> bool:
