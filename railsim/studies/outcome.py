@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,11 @@ class Outcome:
     folder: Path
     records: Records
     computed: int
+
+    def __repr__(self) -> str:
+        ends = Counter(record["status"] for record in self.records)
+        counts = ", ".join(f"{number} {status}" for status, number in ends.items())
+        return f"<Outcome: {self.folder}, {counts}>"
 
     @property
     def failed(self) -> tuple[Record, ...]:

@@ -97,8 +97,8 @@ def _check(
 
 
 def _label(record: Record) -> str:
-    status = record["status"]
-    return f"{record['name']}" + f" ({status})" * (status != "complete")
+    name, status = str(record["name"]), record["status"]
+    return name if status == "complete" else f"{name} ({status})"
 
 
 def _names(quantities: Sequence[str], by_key: Collection[str]) -> list[str]:

@@ -134,6 +134,7 @@ def test_what_the_study_lacks_is_refused(folder, capsys, chosen, words):
 def test_python_draws_and_reports_what_the_command_does(folder, tmp_path, capsys):
     """A folder that is opened again gives the summary, the picture and the page of the command."""
     outcome = railsim.open_study(folder)
+    assert repr(outcome) == f"<Outcome: {folder}, 8 complete>"
     speeds = outcome.to_dataframe()["speed"]
     assert (sorted(set(speeds)), len(outcome.results())) == (SPEEDS, len(speeds))
     chosen = {"against": "track.friction", "family": "speed"}
