@@ -47,6 +47,16 @@ class Column:
         present = {value for value in self.values if value is not None}
         return sorted(present, key=lambda value: (isinstance(value, str), value))
 
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Limits of an axis where the values differ by less than the digits of tables show."""
+        present = [value for value in self.values if value is not None]
+        least = 0.0 if self.decimals is None else 0.1**self.decimals
+        if not present or max(present) - min(present) >= 2.0 * least:
+            return None
+        middle = 0.5 * (min(present) + max(present))
+        return middle - least, middle + least
+
     def text(self, value: float, digits: int) -> str:
         """Return a number with so many digits, none beyond those of tables: 1570, 38.0, 0.00."""
         if self.decimals is None:
@@ -83,6 +93,8 @@ def curves_figure(
                 place = abscissa if x.numeric else x.different.index(abscissa)
                 axes.plot(place, value, "x", color=LIMIT, ms=7)
         axes.set(title=quantity.words, xlabel=x.words)
+        if quantity.limits:
+            axes.set_ylim(quantity.limits)
         if not x.numeric:
             axes.set_xticks(range(len(x.different)), [unformatted(str(v)) for v in x.different])
             _turn_labels(axes)
@@ -154,6 +166,7 @@ def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
             up, along = at = np.nonzero(np.isfinite(values))
             places = np.take(columns, along), np.take(rows, up)
             dots = axes.scatter(*places, c=values[at], cmap="viridis")
+            dots.set_clim(quantity.limits)
             figure.colorbar(dots, ax=axes, pad=0.02)
             continue
         _draw_map(figure, axes, values, quantity)
@@ -166,6 +179,7 @@ def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
 def _draw_map(figure: Figure, axes: Axes, values: Any, quantity: Column) -> None:
     axes.grid(False)
     image = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis")
+    image.set_clim(quantity.limits)
     figure.colorbar(image, ax=axes, pad=0.02)
     if values.size > 60:
         return

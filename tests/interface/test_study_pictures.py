@@ -256,6 +256,16 @@ def test_map_and_ranking_hold_the_values():
     assert [t.get_text() for t in axes.get_yticklabels()] == ["s", "r", "q", "p"]
 
 
+def test_rounding_errors_are_no_colours_and_no_curves():
+    """Forces of 4e-12 kN, printed as 0.00, are one colour and a level line."""
+    noise = Column("force (kN)", [4e-12, -3e-12, 1e-12, 2e-12, None], decimals=2)
+    shown = Column("force (kN)", [0.0, 0.03, 0.01, 0.02, None], decimals=2)
+    drawn = [map_figure([one], SPEED, VEHICLE).axes[0].get_images()[0] for one in (noise, shown)]
+    assert [image.get_clim() for image in drawn] == [pytest.approx((-0.01, 0.01)), (0.0, 0.03)]
+    limits = curves_figure([noise], SPEED, VEHICLE).axes[0].get_ylim()
+    assert limits == pytest.approx((-0.01, 0.01))
+
+
 def test_pictures_name_the_medians_of_runs_that_share_a_point():
     once = Column("value", [1.0, 2.0, 3.0, 4.0])
     speed, vehicle = Column("speed (m/s)", SPEED.values[:4]), Column("vehicle", VEHICLE.values[:4])
