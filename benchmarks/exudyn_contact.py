@@ -13,11 +13,11 @@ import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import W_Q, W_Y
-from railsim.kernels.rhs import kinematics, locate_frames
+from railsim.kernels.rhs import locate_frames, set_kinematics
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import Y_0, Z_0
 from railsim.kernels.track_frame import OMEGA
-from railsim.kernels.wheel_rail import wheel_rail
+from railsim.kernels.wheel_rail import set_wheel_rail_forces
 
 HOLD_STIFFNESS, HOLD_DAMPING = 1e7, 1e6  # N/m, N s/m: keeps the car body at V t
 OUTPUT = 0.005  # s
@@ -30,13 +30,13 @@ def contact(system, work, speed, state):
     `wheel_rail` is put into its caller, and with it views of arrays that railsim's kernels do not
     count.  A caller that counts references would free them, and the arrays behind them, in use.
     """
-    return wheel_rail(system, work, speed, state)
+    return set_wheel_rail_forces(system, work, speed, state)
 
 
 @compiled
 def poses(system, work, state):
     """`kinematics` likewise."""
-    kinematics(system, work, state)
+    set_kinematics(system, work, state)
 
 
 @numba.njit(cache=True)

@@ -8,16 +8,28 @@ is a lower bound of what they take in the time loop.
 from enum import IntEnum
 
 from railsim.kernels import compiled
-from railsim.kernels.contact_table import INSIDE, cell_weights, locate, look_up, stretched_roll
-from railsim.kernels.creepages import creepages
-from railsim.kernels.elements import link_forces, mount_forces
-from railsim.kernels.fastsim import fastsim, kalker_lookup
-from railsim.kernels.patches import side_by_side
-from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, rates_of_state
+from railsim.kernels.contact_table import (
+    INSIDE,
+    find_cell,
+    look_up,
+    set_cell_weights,
+    stretched_roll,
+)
+from railsim.kernels.creepages import set_creepages
+from railsim.kernels.elements import add_link_forces, add_mount_forces
+from railsim.kernels.fastsim import fastsim, look_up_kalker
+from railsim.kernels.patches import patch_arrays
+from railsim.kernels.rhs import (
+    locate_frames,
+    set_accelerations,
+    set_all_rates,
+    set_body_rates,
+    set_kinematics,
+)
 from railsim.kernels.state import ARC_LENGTH, SPEED
-from railsim.kernels.support import AS_GIVEN
-from railsim.kernels.wheel_contact import normal_contact
-from railsim.kernels.wheel_rail import add_creep_forces, wheel_rail
+from railsim.kernels.support import KEEP_RAILS
+from railsim.kernels.wheel_contact import add_normal_contact
+from railsim.kernels.wheel_rail import add_creep_forces, set_wheel_rail_forces
 
 
 class Part(IntEnum):
@@ -47,12 +59,12 @@ def many(part, system, work, state, derivative, patches, n):
     first = 12 * system.bodies.kind.shape[0]
     inner = state[first : first + system.internal.kind.shape[0]]
     origin = system.bodies.frame[system.bodies.reference]
-    arrays, law, contact = side_by_side(work.patch), system.contact.law, system.contact
+    arrays, law, contact = patch_arrays(work.patch), system.contact.law, system.contact
     for _ in range(n):
         if part == Part.RIGHT_HAND_SIDE:
-            rates_of_state(system, work, state, derivative)
+            set_all_rates(system, work, state, derivative)
         elif part == Part.MECHANICS:
-            _, _, patches = mechanics(system, work, state, derivative, AS_GIVEN)
+            _, _, patches = set_body_rates(system, work, state, derivative, KEEP_RAILS)
         elif part == Part.FRAMES:
             locate_frames(
                 system.track,
@@ -64,24 +76,24 @@ def many(part, system, work, state, derivative, patches, n):
                 work.cell_u,
             )
         elif part == Part.KINEMATICS:
-            kinematics(system, work, state)
+            set_kinematics(system, work, state)
         elif part == Part.LINKS:
-            link_forces(system, work, inner)
+            add_link_forces(system, work, inner)
         elif part == Part.MOUNTS:
-            mount_forces(system, work, inner)
+            add_mount_forces(system, work, inner)
         elif part == Part.WHEEL_RAIL:
-            wheel_rail(system, work, state[SPEED], state)
+            set_wheel_rail_forces(system, work, state[SPEED], state)
         elif part == Part.NORMAL_CONTACT:
-            _, _, patches = normal_contact(system, work, state[SPEED], state)
+            _, _, patches = add_normal_contact(system, work, state[SPEED], state)
         elif part == Part.CREEPAGES:
-            creepages(system, work, patches, state[SPEED], state)
-            kalker_lookup(patches, arrays, contact.kalker)
+            set_creepages(system, work, patches, state[SPEED], state)
+            look_up_kalker(patches, arrays, contact.kalker)
         elif part == Part.FASTSIM:
             fastsim(patches, law.n_x, law.n_y, arrays, law.G, work.creep.strips)
         elif part == Part.CREEP_FORCES:
             add_creep_forces(system, work, patches, state[SPEED], state)
         elif part == Part.DYNAMICS:
-            dynamics(system, work, state, derivative)
+            set_accelerations(system, work, state, derivative)
         else:
             _look_up(contact, work, state)
     return patches
@@ -93,11 +105,11 @@ def _look_up(contact, work, state):
     table = contact.table[0, 1]
     yaw = state[6 * b + 5]
     stretched, roll_slope = stretched_roll(state[6 * b + 3])
-    where, iy, ir, iw, ty, tr, tw = locate(
+    where, iy, ir, iw, ty, tr, tw = find_cell(
         contact, table, state[6 * b + 1], state[6 * b + 3], stretched, yaw * yaw
     )
     if where == INSIDE:
-        cell_weights(contact, ty, tr, roll_slope, work.weights)
+        set_cell_weights(contact, ty, tr, roll_slope, work.weights)
         look_up(contact, table, 0, iy, ir, iw, tw, work.weights, work.look_up)
 
 

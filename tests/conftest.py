@@ -184,7 +184,7 @@ def plain(monkeypatch):
     """Functions of a module of the kernels as they are without compilation, lanes too."""
 
     def without_compiler(module):
-        monkeypatch.setattr(module, "rarely", bool, raising=False)
+        monkeypatch.setattr(module, "unlikely", bool, raising=False)
         for name, thing in list(vars(module).items()):
             function = getattr(lanes_plain, name, getattr(thing, "py_func", thing))
             monkeypatch.setattr(module, name, getattr(module, f"{name}_plain", function))

@@ -23,8 +23,8 @@ from railsim.contact.creep_table import NO_TABLE, creep_table
 from railsim.contact.kalker import kalker_coefficients
 from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
 from railsim.errors import Fault, Faults, ModelError, input_error, nearest
-from railsim.kernels.aligned import aligned_zeros
-from railsim.kernels.creep import creep_forces, falling_friction
+from railsim.kernels.alignment import aligned_zeros
+from railsim.kernels.creep import creep_forces, reduce_friction
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.patches import CreepLaw, CreepScratch, Patches
 
@@ -170,7 +170,7 @@ def creep_force(
         *np.zeros((4, n)),
     )
     if friction_rest < 1.0:
-        falling_friction(n, patches, np.full(n, speed), friction_rest, friction_decay)
+        reduce_friction(n, patches, np.full(n, speed), friction_rest, friction_decay)
     chosen = creep_law(name, (nx, ny), G, nu, (reduction, k_slip), adhesion_curve)
     creep_forces(n, chosen, patches, creep_scratch(n, chosen))
     outside = int(patches.outside.sum())
@@ -202,7 +202,7 @@ def creep_law(
     table = creep_table(nu) if name == "table" else NO_TABLE
     curve = np.zeros((0, 2)) if adhesion_curve is None else np.array(adhesion_curve, dtype=float)
     number, data = CREEP_LAWS[name].number, (table.coefficients, table.scale, curve)
-    return CreepLaw(number, *grid, G, *third_body, *data, own=0, block=np.zeros(0))
+    return CreepLaw(number, *grid, G, *third_body, *data, user_law=0, block=np.zeros(0))
 
 
 def creep_scratch(n: int, law: CreepLaw) -> CreepScratch:

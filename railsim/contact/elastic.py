@@ -85,13 +85,13 @@ def loaded_contact(table: ContactTable, y: float, roll: float, load: float) -> L
     grid = table.y0, table.dy, table.roll0, table.droll, table.w
     arrays = TableArrays(table.values[None], np.array([table.shear]), *grid)
     stretched, roll_slope = kernel.stretched_roll(roll)
-    where, iy, ir, iw, ty, tr, tw = kernel.locate(arrays, 0, y, roll, stretched, 0.0)
+    where, iy, ir, iw, ty, tr, tw = kernel.find_cell(arrays, 0, y, roll, stretched, 0.0)
     if where != kernel.INSIDE:
         raise ModelError(
             f"y = {1e3 * y:.2f} mm with roll {1e3 * roll:.2f} mrad lies outside of the table"
         )
     weights, flat = np.empty(kernel.N_WEIGHT), np.empty(kernel.N_PATCH * kernel.LOOK_UP_SIZE)
-    kernel.cell_weights(arrays, ty, tr, roll_slope, weights)
+    kernel.set_cell_weights(arrays, ty, tr, roll_slope, weights)
     for patch in range(kernel.N_PATCH):
         kernel.look_up(arrays, 0, patch, iy, ir, iw, tw, weights, flat, patch * kernel.LOOK_UP_SIZE)
     fields = flat.reshape(kernel.N_PATCH, kernel.LOOK_UP_SIZE)
@@ -100,7 +100,7 @@ def loaded_contact(table: ContactTable, y: float, roll: float, load: float) -> L
 
     def approaches(z: float) -> Floats:
         e = z - fields[:, kernel.G]
-        kernel.coupled_approaches(compliance, 0, stiffness, e)
+        kernel.couple_approaches(compliance, 0, stiffness, e)
         return e
 
     def vertical(z: float) -> Floats:
@@ -122,7 +122,7 @@ def loaded_contact(table: ContactTable, y: float, roll: float, load: float) -> L
             continue
         field = fields[patch]
         by_K = 0.4 * e * e * np.sqrt(e) * field[kernel.K_Y] + e**3 / 3.0 * field[kernel.K2_Y]
-        c_y, _, a1, b1, tangent = kernel.under_load(field, 0, float(N_z))
+        c_y, _, a1, b1, tangent = kernel.patch_under_load(field, 0, float(N_z))
         N = float(N_z) * float(np.hypot(1.0, tangent))
         a, b = (float(axis) * N ** (1.0 / 3.0) for axis in (a1, b1))
         patches.append(

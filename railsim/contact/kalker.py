@@ -12,7 +12,7 @@ a/b and Poisson's ratio only.  Kalker computed and printed them for 19 ratios an
 numbers; outside 0.1 <= a/b <= 10 his asymptotic expressions lead on, scaled to join the table.
 
 Read `kalker_coefficients` first; `creep_tables` prepares the small table that the time loop looks
-up (kernel :func:`railsim.kernels.fastsim.kalker_lookup`).
+up (kernel :func:`railsim.kernels.fastsim.look_up_kalker`).
 
 Source: Kalker, J.J. (1990), Three-Dimensional Elastic Bodies in Rolling Contact, Kluwer,
 appendix E, table E.3 (C11, C22, C23 also stored in the public program CONTACT).

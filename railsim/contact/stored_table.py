@@ -15,7 +15,7 @@ from railsim.contact.table import ContactTable, Normal, TableGrid, build_contact
 from railsim.kernels import cache, contact_geometry, elastic_patch, non_elliptic
 from railsim.kernels import hertz as hertz_kernel
 from railsim.kernels import table_slice as kernel
-from railsim.kernels.lock import alone
+from railsim.kernels.lock import exclusive
 from railsim.profiles.profile import Profile
 
 MOST_OPEN = 16  # stored tables that a process keeps open, mapped and checked
@@ -76,13 +76,13 @@ def cached_contact_table(
 
 def kept_table(digest: str, build: Callable[[], ContactTable]) -> ContactTable:
     """Return the table stored under a hash of all that enters, or build and store it."""
-    folder = cache.own_folder("tables")
+    folder = cache.cache_subfolder("tables")
     if folder is None:
         return build()
     path = folder / f"{digest[:32]}.npy"
     if stored := _stored_table(path):
         return stored
-    with alone(folder / "tables.lock"):
+    with exclusive(folder / "tables.lock"):
         if stored := _stored_table(path):  # by the process that was waited for
             return stored
         table = build()
@@ -91,7 +91,7 @@ def kept_table(digest: str, build: Callable[[], ContactTable]) -> ContactTable:
 
 
 def _stored_table(path: Path) -> ContactTable | None:
-    text = cache.stored(path.with_suffix(".json"))
+    text = cache.load(path.with_suffix(".json"))
     if text is None:
         return None
     try:
@@ -113,7 +113,7 @@ def _checked_table(path: Path, text: bytes, stamp: tuple[int, ...]) -> ContactTa
         table = ContactTable(values=np.load(path, mmap_mode="r"), **facts)
         with suppress(OSError):
             os.utime(path.with_suffix(".json"))  # the time of the last use
-        if cache.stored(checked) == known:
+        if cache.load(checked) == known:
             return table
         whole = zlib.crc32(table.values.data) == crc
     except (OSError, ValueError, TypeError, KeyError, EOFError):
@@ -127,7 +127,7 @@ def _checked_table(path: Path, text: bytes, stamp: tuple[int, ...]) -> ContactTa
 
 
 def _store_table(table: ContactTable, path: Path) -> None:
-    if cache.stored(path.with_suffix(".json")):  # meanwhile, by another process
+    if cache.load(path.with_suffix(".json")):  # meanwhile, by another process
         return  # on a network disk a file that others have mapped must not be replaced
     facts = {name: getattr(table, name) for name in ContactTable.__dataclass_fields__}
     facts["crc32"] = zlib.crc32(facts.pop("values").data)

@@ -18,8 +18,8 @@ from pathlib import Path
 import llvmlite
 import numba
 
-from railsim.kernels.cache import drop_old, own_folder
-from railsim.kernels.compiler import PRIVATE, compiled_by
+from railsim.kernels.cache import cache_subfolder, remove_old_code
+from railsim.kernels.compiler import PRIVATE, compile_kernel
 
 # The subset of fastmath that keeps NaN and infinity visible to the blow-up checks.
 FASTMATH = {"contract", "arcp", "reassoc", "nsz"}
@@ -40,12 +40,12 @@ def source_hash(folder: Path) -> str:
 
 def _cache_folder() -> Path | None:
     """Folder of these sources' compiled code; None where it must not or cannot be used."""
-    given = os.environ.get("NUMBA_CACHE_DIR")  # a user's choice comes first
-    hashed = source_hash(Path(__file__).parent)
-    folder = own_folder("kernels", hashed, base=Path(given) if given else None)
+    user_folder = os.environ.get("NUMBA_CACHE_DIR")  # a user's choice comes first
+    name = source_hash(Path(__file__).parent)
+    folder = cache_subfolder("kernels", name, base=Path(user_folder) if user_folder else None)
     if folder is not None:
         with suppress(OSError):
-            drop_old(folder)
+            remove_old_code(folder)
     return folder
 
 
@@ -78,7 +78,7 @@ def compiled(function=None, *, python=True, inline=False, ordered=False, in_loop
     options = {"inline": "always"} if inline else {}
     if python:
         options["nogil"] = True
-    return compiled_by(
+    return compile_kernel(
         function,
         _FOLDER,
         ORDERED if ordered else FASTMATH,

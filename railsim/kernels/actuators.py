@@ -10,7 +10,7 @@ FORCE      F = u
 DAMPER     F = max(0, u) x'
 POSITION   F = k (x - u) + c x'
 BRAKE      F = max(0, u) x' r/v_0, at most max(0, u) to either side, r the wheel's radius
-OWN        F and the rates of its states by a law of one's own
+LAW        F and the rates of its states by a law of one's own
 
 The force is held within its limit and within the power over |x'|, and fades out over the last part
 of the stroke where it pushes on outwards.  A command acts after its delay; the first-order lag and
@@ -21,9 +21,9 @@ from math import isfinite, sqrt
 
 from railsim.kernels import compiled
 from railsim.kernels.driving import braking_share
-from railsim.kernels.own_laws import call_at
 from railsim.kernels.state import SPEED, TIME, internal_begin
 from railsim.kernels.system import ANGULAR, FORCE, MOMENT, POSITION, RADIUS, VELOCITY
+from railsim.kernels.user_laws import call_law
 from railsim.kernels.vectors import (
     add_at,
     cross,
@@ -37,11 +37,11 @@ from railsim.kernels.vectors import (
     vector_at,
 )
 
-# columns of Actuators.which: along the line, along an axis or about one; what the command is;
+# columns of Actuators.codes: along the line, along an axis or about one; what the command is;
 # internal state of the lag, else -1; where in `Work.memory` the last command stands, where those on
 # their way and how many of them; law and its block, first of its states and their number
-ACTION, MODE, LAG_STATE, COMMAND, QUEUE, SLOTS, LAW, BLOCK, OWN_STATE, OWN_STATES = range(10)
-WHICH_SIZE = 10
+ACTION, MODE, LAG_STATE, COMMAND, QUEUE, SLOTS, LAW, BLOCK, USER_STATE, USER_STATES = range(10)
+CODES_SIZE = 10
 LARGEST = 1  # the largest command, behind the last one in `Work.memory`
 # values of ACTION: the line, three axes along which it acts, three about which, axle of body 2
 LINE, ALONG, ABOUT, AXLE = 0, 1, 4, 7
@@ -52,46 +52,46 @@ BY_FORCE, BY_DAMPER, BY_POSITION, BY_LAW, BY_BRAKE = range(5)
 LENGTH, SENSE, LIMIT, POWER, STROKE, STIFFNESS, DAMPING, DELAY = range(6, 14)
 ROW_SIZE = 14
 # block of a law: force, rates of its states; deflection, rate, time, command, states, parameters
-LAW_TAKES = 4
+LAW_INPUTS = 4
 FADE = 0.02  # part of the stroke over which the force fades out
-EARLY = 1e-9  # s; what is due is due by so much before
+TIME_EPS = 1e-9  # s; what is due is due by so much before
 
 
 @compiled
-def command_at(actuators, memory, i, time):
+def effective_command(actuators, memory, i, time):
     """Command of actuator `i` that has arrived at `time`."""
-    slots = actuators.which[i, SLOTS]
+    slots = actuators.codes[i, SLOTS]
     if slots == 0:
-        return memory[actuators.which[i, COMMAND]]
-    queue = actuators.which[i, QUEUE]
+        return memory[actuators.codes[i, COMMAND]]
+    queue = actuators.codes[i, QUEUE]
     count = int(memory[queue])
     last = count
     while last > 0 and last > count - slots:
         last -= 1
         k = queue + 1 + 2 * (last % slots)
-        if memory[k] + actuators.row[i, DELAY] <= time + EARLY:
+        if memory[k] + actuators.row[i, DELAY] <= time + TIME_EPS:
             return memory[k + 1]
     return 0.0
 
 
 @compiled
-def send(actuators, memory, i, value, time):
+def send_command(actuators, memory, i, value, time):
     """Send a command to actuator `i`; False where too many are on their way."""
-    at, slots = actuators.which[i, COMMAND], actuators.which[i, SLOTS]
-    if value == memory[at]:
+    last, slots = actuators.codes[i, COMMAND], actuators.codes[i, SLOTS]
+    if value == memory[last]:
         return True
     if slots > 0:
-        queue = actuators.which[i, QUEUE]
+        queue = actuators.codes[i, QUEUE]
         count = int(memory[queue])
         if count >= slots:  # the second oldest takes over from the one that is overwritten
             following = memory[queue + 1 + 2 * ((count + 1) % slots)]
-            if following + actuators.row[i, DELAY] > time + EARLY:
+            if following + actuators.row[i, DELAY] > time + TIME_EPS:
                 return False
         k = queue + 1 + 2 * (count % slots)
         memory[k], memory[k + 1] = time, value
         memory[queue] = count + 1
-    memory[at] = value
-    memory[at + LARGEST] = max(memory[at + LARGEST], value)
+    memory[last] = value
+    memory[last + LARGEST] = max(memory[last + LARGEST], value)
     return True
 
 
@@ -99,14 +99,14 @@ def send(actuators, memory, i, value, time):
 def actuator_motion(system, work, state, i):
     """Deflection and rate of element `i`, axis in which it acts, arms on both bodies, distance."""
     acts, pose = system.actuators, work.pose
-    one, two, action = acts.body[i, 0], acts.body[i, 1], acts.which[i, ACTION]
-    R1, R2 = matrix_at(pose, one, 0), matrix_at(pose, two, 0)
-    omega_1, omega_2 = vector_at(pose, one, ANGULAR), vector_at(pose, two, ANGULAR)
+    b1, b2, action = acts.body[i, 0], acts.body[i, 1], acts.codes[i, ACTION]
+    R1, R2 = matrix_at(pose, b1, 0), matrix_at(pose, b2, 0)
+    omega_1, omega_2 = vector_at(pose, b1, ANGULAR), vector_at(pose, b2, ANGULAR)
     a, b = rotate(R1, vector_at(acts.row, i, 0)), rotate(R2, vector_at(acts.row, i, 3))
-    g = minus(plus(minus(vector_at(pose, two, POSITION), vector_at(pose, one, POSITION)), b), a)
+    g = minus(plus(minus(vector_at(pose, b2, POSITION), vector_at(pose, b1, POSITION)), b), a)
     w = minus(
-        plus(vector_at(pose, two, VELOCITY), cross(omega_2, b)),
-        plus(vector_at(pose, one, VELOCITY), cross(omega_1, a)),
+        plus(vector_at(pose, b2, VELOCITY), cross(omega_2, b)),
+        plus(vector_at(pose, b1, VELOCITY), cross(omega_1, a)),
     )
     sense = acts.row[i, SENSE]
     if action == LINE:
@@ -115,38 +115,38 @@ def actuator_motion(system, work, state, i):
         return length - acts.row[i, LENGTH], dot(axis, w), axis, a, b, g
     if action < ABOUT:
         k = action - ALONG
-        axis = sense * pose[one, k], sense * pose[one, 3 + k], sense * pose[one, 6 + k]
+        axis = sense * pose[b1, k], sense * pose[b1, 3 + k], sense * pose[b1, 6 + k]
         return dot(axis, g), dot(axis, minus(w, cross(omega_1, g))), axis, a, b, g
     if action == AXLE:
-        axis = pose[two, 1], pose[two, 4], pose[two, 7]
-        spin = state[6 * system.bodies.kind.shape[0] + 6 * two + 4]
+        axis = pose[b2, 1], pose[b2, 4], pose[b2, 7]
+        spin = state[6 * system.bodies.kind.shape[0] + 6 * b2 + 4]
         return 0.0, spin - dot(axis, omega_1), axis, a, b, g
     k = action - ABOUT
-    axis = sense * pose[one, k], sense * pose[one, 3 + k], sense * pose[one, 6 + k]
+    axis = sense * pose[b1, k], sense * pose[b1, 3 + k], sense * pose[b1, 6 + k]
     # the antisymmetric part of R_1^T R_2, as of mounts
     m, n = (k + 1) % 3, (k + 2) % 3
-    left, right = 0.0, 0.0
+    r_nm, r_mn = 0.0, 0.0
     for j in range(3):
-        left += pose[one, 3 * j + n] * pose[two, 3 * j + m]
-        right += pose[one, 3 * j + m] * pose[two, 3 * j + n]
-    return 0.5 * sense * (left - right), dot(axis, minus(omega_2, omega_1)), axis, a, b, g
+        r_nm += pose[b1, 3 * j + n] * pose[b2, 3 * j + m]
+        r_mn += pose[b1, 3 * j + m] * pose[b2, 3 * j + n]
+    return 0.5 * sense * (r_nm - r_mn), dot(axis, minus(omega_2, omega_1)), axis, a, b, g
 
 
 @compiled(python=False)
-def own_force(system, work, state, i, x, rate, command):
+def user_force(system, work, state, i, x, rate, command):
     """Force by a law of one's own; drives its states."""
     acts, block = system.actuators, work.memory
-    first, states = acts.which[i, BLOCK], acts.which[i, OWN_STATES]
-    inner = acts.which[i, OWN_STATE]
-    begin = internal_begin(system.bodies.kind.shape[0]) + inner
-    given = first + 1 + states
-    block[given], block[given + 1] = x, rate
-    block[given + 2], block[given + 3] = state[TIME], command
+    first, states = acts.codes[i, BLOCK], acts.codes[i, USER_STATES]
+    first_state = acts.codes[i, USER_STATE]
+    begin = internal_begin(system.bodies.kind.shape[0]) + first_state
+    inputs = first + 1 + states
+    block[inputs], block[inputs + 1] = x, rate
+    block[inputs + 2], block[inputs + 3] = state[TIME], command
     for k in range(states):
-        block[given + LAW_TAKES + k] = state[begin + k]
-    call_at(system.own.places[acts.which[i, LAW]], block, first)
+        block[inputs + LAW_INPUTS + k] = state[begin + k]
+    call_law(system.user_laws.addresses[acts.codes[i, LAW]], block, first)
     for k in range(states):
-        work.drive[inner + k, 0] = block[first + 1 + k]
+        work.drive[first_state + k, 0] = block[first + 1 + k]
     return block[first]
 
 
@@ -166,8 +166,8 @@ def limited_force(acts, i, force, x, rate):
 def actuator_force(system, work, state, i, x, rate):
     """Force of element `i` at its deflection and rate; leaves the drive of its lag."""
     acts = system.actuators
-    command = command_at(acts, work.memory, i, state[TIME])
-    lag, mode = acts.which[i, LAG_STATE], acts.which[i, MODE]
+    command = effective_command(acts, work.memory, i, state[TIME])
+    lag, mode = acts.codes[i, LAG_STATE], acts.codes[i, MODE]
     limit = acts.row[i, LIMIT]
     if mode in (BY_FORCE, BY_BRAKE):
         command = min(limit, max(-limit, command))
@@ -184,34 +184,34 @@ def actuator_force(system, work, state, i, x, rate):
         rim = rate * system.bodies.row[acts.body[i, 1], RADIUS]
         force = max(0.0, command) * braking_share(rim, state[SPEED])
     else:
-        force = own_force(system, work, state, i, x, rate, command)
+        force = user_force(system, work, state, i, x, rate, command)
     return limited_force(acts, i, force, x, rate)
 
 
 @compiled(python=False)
-def actuator_forces(system, work, state, on_axles):
+def add_actuator_forces(system, work, state, about_axles):
     """Add the forces of these elements to `pose`; the first without a finite force, else -1.
 
-    `on_axles`: those about axles alone, or all others.
+    `about_axles`: those about axles alone, or all others.
     """
     acts, pose = system.actuators, work.pose
     for i in range(acts.body.shape[0]):
-        if (acts.which[i, ACTION] == AXLE) != on_axles:
+        if (acts.codes[i, ACTION] == AXLE) != about_axles:
             continue
         x, rate, axis, a, b, g = actuator_motion(system, work, state, i)
         force = actuator_force(system, work, state, i, x, rate)
         if not isfinite(force):
             return i
         f = times(force, axis)
-        one, two, action = acts.body[i, 0], acts.body[i, 1], acts.which[i, ACTION]
+        b1, b2, action = acts.body[i, 0], acts.body[i, 1], acts.codes[i, ACTION]
         if action >= ABOUT:
-            add_at(pose, one, MOMENT, f)
-            add_at(pose, two, MOMENT, negative(f))
+            add_at(pose, b1, MOMENT, f)
+            add_at(pose, b2, MOMENT, negative(f))
             continue
         # along an axis the force acts at the point of body 2 on both
         arm = a if action == LINE else plus(a, g)
-        add_at(pose, one, FORCE, f)
-        add_at(pose, one, MOMENT, cross(arm, f))
-        add_at(pose, two, FORCE, negative(f))
-        add_at(pose, two, MOMENT, negative(cross(b, f)))
+        add_at(pose, b1, FORCE, f)
+        add_at(pose, b1, MOMENT, cross(arm, f))
+        add_at(pose, b2, FORCE, negative(f))
+        add_at(pose, b2, MOMENT, negative(cross(b, f)))
     return -1

@@ -13,7 +13,7 @@ from numba.extending import intrinsic
 
 
 @intrinsic
-def _rarely(typingctx, condition):
+def _unlikely(typingctx, condition):
     """Return the condition, which is rarely true."""
 
     def codegen(context, builder, sig, args):
@@ -25,4 +25,4 @@ def _rarely(typingctx, condition):
     return types.boolean(types.boolean), codegen
 
 
-rarely = bool if numba.config.DISABLE_JIT else _rarely
+unlikely = bool if numba.config.DISABLE_JIT else _unlikely

@@ -31,25 +31,25 @@ _HEAD_BYTES = 39
 _unwritable: set[Path] = set()
 _OWNERS = hasattr(os, "geteuid")  # Windows has lists of access instead, which are not read here
 _BINARY = getattr(os, "O_BINARY", 0)
-_NO_LINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+_NO_SYMLINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 
 MARK = "CACHEDIR.TAG"  # the name and its first line are known to programs for backups
 _MARK_TEXT = b"""Signature: 8a477f597d28d172789f06886806bc55
 # This folder was made by railsim, which may change and remove it.
 """
-_OF_SOURCES = re.compile("[0-9a-f]{16}")
-_OWN_FILES = (".nbc", ".nbi", ".part", ".lock")
+_HASH_NAME = re.compile("[0-9a-f]{16}")
+_CACHE_SUFFIXES = (".nbc", ".nbi", ".part", ".lock")
 HOUR, MONTH = 3600.0, 30 * 24 * 3600.0
 
 
-def notice(sentence: str) -> None:
-    """Say something about the cache, once."""
+def warn_once(sentence: str) -> None:
+    """Warn about the cache, once."""
     if sentence not in notices:
         notices[sentence] = None
         _LOG.warning(sentence)
 
 
-def own_folder(*names: str, base: Path | None = None) -> Path | None:
+def cache_subfolder(*names: str, base: Path | None = None) -> Path | None:
     """Return a folder of the cache, made if it is not there; None where none can be used.
 
     The cache is the folder `railsim` below `base`, else below $RAILSIM_CACHE_DIR, else in the
@@ -62,18 +62,18 @@ def own_folder(*names: str, base: Path | None = None) -> Path | None:
     base : Path, optional
         Where the user wants this part of the cache.
     """
-    given = base or os.environ.get("RAILSIM_CACHE_DIR")
-    top = Path(given or _user_cache(), "railsim")
+    user_folder = base or os.environ.get("RAILSIM_CACHE_DIR")
+    top = Path(user_folder or _user_cache(), "railsim")
     folder = top.joinpath(*names)
     try:
-        reason = _prepared(top, names, reserved=not given)
+        reason = _prepare(top, names, reserved=not user_folder)
         if not reason:
             folder = folder.resolve()
-            reason = _distrust(folder, top.resolve())
+            reason = _security_fault(folder, top.resolve())
     except (OSError, RuntimeError) as error:
         folder, reason = top, str(getattr(error, "strerror", None) or error)
     if reason:
-        notice(
+        warn_once(
             f"the cache {folder} is not used, each start compiles again: {reason}; choose another "
             "folder by RAILSIM_CACHE_DIR"
         )
@@ -84,11 +84,11 @@ def own_folder(*names: str, base: Path | None = None) -> Path | None:
 
 
 def _user_cache() -> Path:
-    given = os.environ.get("XDG_CACHE_HOME", "")
-    return Path(given if os.path.isabs(given) else os.path.expanduser("~/.cache"))
+    folder = os.environ.get("XDG_CACHE_HOME", "")
+    return Path(folder if os.path.isabs(folder) else os.path.expanduser("~/.cache"))
 
 
-def _prepared(top: Path, names: tuple[str, ...], *, reserved: bool) -> str:
+def _prepare(top: Path, names: tuple[str, ...], *, reserved: bool) -> str:
     """Make the folders of the cache, each for this user only; say why they must not be used.
 
     In the user's folder for caches the name `railsim` is reserved for railsim (XDG base directory
@@ -97,9 +97,9 @@ def _prepared(top: Path, names: tuple[str, ...], *, reserved: bool) -> str:
     if reserved and not top.is_absolute():
         return "this user has no home"
     path = top = top.absolute()
-    for above in reversed(top.parents):
-        if not above.is_dir():
-            _make(above)
+    for parent in reversed(top.parents):
+        if not parent.is_dir():
+            _make(parent)
     _make_marked(top, reserved=reserved)
     if not (reserved or _is_marked(top)):
         return f"{top} is not a cache of railsim's"
@@ -137,29 +137,29 @@ def _is_marked(folder: Path) -> bool:
     return _content(folder / MARK) == _MARK_TEXT
 
 
-def _distrust(folder: Path, top: Path) -> str:
+def _security_fault(folder: Path, top: Path) -> str:
     """Say why another user could have written into a folder of the cache."""
     if not _OWNERS:
-        own = folder.is_relative_to(Path.home().resolve())
-        return "" if own else f"who may write to {folder} is known of folders of your own only"
+        in_home = folder.is_relative_to(Path.home().resolve())
+        return "" if in_home else f"who may write to {folder} is known of folders of your own only"
     for path in (folder, *folder.parents):
         facts = os.lstat(path)
         if facts.st_uid not in (os.geteuid(), 0):
             return f"{path} belongs to another user"
-        others = bool(facts.st_mode & stat.S_IWOTH)
+        by_others = bool(facts.st_mode & stat.S_IWOTH)
         if path == folder or path.is_relative_to(top):
             # a group of the same number as its user is that user's own
             shared = facts.st_gid not in (0, facts.st_uid)
-            others |= shared and bool(facts.st_mode & stat.S_IWGRP)
+            by_others |= shared and bool(facts.st_mode & stat.S_IWGRP)
         elif facts.st_mode & stat.S_ISVTX:
-            others = False
+            by_others = False
         # who shares a group may exchange the folder, but not make one that belongs to this user
-        if others:
+        if by_others:
             return f"other users may write to {path}"
     return ""
 
 
-def drop_old(folder: Path) -> None:
+def remove_old_code(folder: Path) -> None:
     """Remove code of other sources that nobody has used for a month, and files never finished.
 
     Parameters
@@ -176,7 +176,7 @@ def drop_old(folder: Path) -> None:
         if part.stat().st_mtime < now - HOUR:
             part.unlink(missing_ok=True)
     for old in folder.parent.iterdir():
-        if not _OF_SOURCES.fullmatch(old.name) or old.is_symlink() or not _is_marked(old):
+        if not _HASH_NAME.fullmatch(old.name) or old.is_symlink() or not _is_marked(old):
             continue
         if (old / MARK).stat().st_mtime < now - MONTH:
             _remove(old)
@@ -186,7 +186,7 @@ def _remove(folder: Path) -> None:
     """Remove from a marked folder what railsim has put there, and the folder if that was all."""
     for where, _, names in os.walk(folder, topdown=False):
         for name in names:
-            if name.endswith(_OWN_FILES):
+            if name.endswith(_CACHE_SUFFIXES):
                 os.unlink(os.path.join(where, name))
         if Path(where) != folder:
             with suppress(OSError):  # not empty
@@ -199,18 +199,18 @@ def _remove(folder: Path) -> None:
 def _content(path: Path) -> bytes | None:
     """Return the content of a regular file that only this user or root can have written."""
     try:
-        handle = os.open(path, os.O_RDONLY | _NO_LINK | _BINARY)
+        handle = os.open(path, os.O_RDONLY | _NO_SYMLINK | _BINARY)
         with open(handle, "rb") as file:
             facts = os.fstat(file.fileno())
-            others = facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-            if _OWNERS and (others or facts.st_uid not in (os.geteuid(), 0)):
+            by_others = facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+            if _OWNERS and (by_others or facts.st_uid not in (os.geteuid(), 0)):
                 return None
             return file.read() if stat.S_ISREG(facts.st_mode) else None
     except OSError:
         return None
 
 
-def stored(path: Path) -> bytes | None:
+def load(path: Path) -> bytes | None:
     """Return what was stored under a name; None where there is nothing, or it is damaged."""
     text = _content(path)
     if text is None:
@@ -224,7 +224,7 @@ def stored(path: Path) -> bytes | None:
 
 def discard(path: Path) -> None:
     """Remove a damaged file of the cache, and say so."""
-    notice(f"the cache {path.parent} was damaged; what was lost is made again")
+    warn_once(f"the cache {path.parent} was damaged; what was lost is made again")
     with suppress(OSError):
         path.unlink()
 
@@ -254,7 +254,7 @@ def store_file(path: Path, write: Callable[[int], None]) -> bool:
         os.replace(name, path)
     except OSError as error:
         _unwritable.add(path.parent)
-        notice(
+        warn_once(
             f"the cache {path.parent} cannot be written ({error.strerror or error}); the next "
             "run prepares itself again"
         )

@@ -22,7 +22,7 @@ from railsim.kernels.contact_columns import W_CHECK, W_CHECK_GAMMA
 from railsim.kernels.state import ARC_LENGTH, velocity_begin
 from railsim.kernels.support import SKIP
 
-from .rails import ASIDE, ASIDE_SLOPE, MIDDLE_Y, RAIL_BEND, RAIL_SLOPE, ROLL, ROLL_SLOPE, SLOPE_Y
+from .rails import MIDDLE_Y, RAIL_BEND, RAIL_SLOPE, ROLL, ROLL_SLOPE, SHIFT, SHIFT_SLOPE, SLOPE_Y
 
 # columns of Contact.check: side, first and last row of its flangeway, stiffness [N/m], damping
 # [N s/m], coefficient of friction
@@ -57,11 +57,11 @@ def add_check_rails(system, work, speed, state):
                     i += 1
                 slope = (table[i + 1, 1] - table[i, 1]) / (table[i + 1, 0] - table[i, 0])
                 flangeway = table[i, 1] + slope * (s - table[i, 0])
-                check_rail(system, work, speed, state, w, c, flangeway, slope)
+                add_check_rail(system, work, speed, state, w, c, flangeway, slope)
 
 
 @compiled(python=False)
-def check_rail(system, work, speed, state, w, c, flangeway, slope):
+def add_check_rail(system, work, speed, state, w, c, flangeway, slope):
     """Force of check rail `c` on wheelset `w`, where its flangeway has a width and slope."""
     contact, force, wheel = system.contact, work.rail_force, work.wheel
     b = contact.body[w]
@@ -69,26 +69,26 @@ def check_rail(system, work, speed, state, w, c, flangeway, slope):
     sign = 2.0 * side - 1.0
     n = system.bodies.kind.shape[0]
     q, v = 6 * b, velocity_begin(n) + 6 * b
-    below, reach = contact.check_wheel[w, c, BELOW], contact.check_wheel[w, c, REACH]
+    z_c, reach = contact.check_wheel[w, c, BELOW], contact.check_wheel[w, c, REACH]
     roll, yaw = state[q + 3] - work.plane[w, ROLL], state[q + 5] - work.rail[w, side, RAIL_SLOPE]
-    y = sign * (state[q + 1] - work.plane[w, MIDDLE_Y] - work.rail[w, side, ASIDE] - below * roll)
+    y = sign * (state[q + 1] - work.plane[w, MIDDLE_Y] - work.rail[w, side, SHIFT] - z_c * roll)
     size = abs(yaw) + SMALL_YAW
     p = reach * yaw * yaw / size - (contact.check_wheel[w, c, CLEARANCE] + flangeway + y)
     if p <= 0.0:
         return
-    lead = reach * yaw * (abs(yaw) + 2.0 * SMALL_YAW) / (size * size)
+    x_c = reach * yaw * (abs(yaw) + 2.0 * SMALL_YAW) / (size * size)
     # rates of the Euler angles were left here by the kinematics
     roll_rate = work.acceleration[b, 3] - speed * work.plane[w, ROLL_SLOPE]
     yaw_rate = work.acceleration[b, 5] - speed * work.rail[w, side, RAIL_BEND]
-    y_rate = state[v + 1] - speed * (work.plane[w, SLOPE_Y] + work.rail[w, side, ASIDE_SLOPE])
-    p_rate = lead * yaw_rate - speed * slope - sign * (y_rate - below * roll_rate)
+    y_rate = state[v + 1] - speed * (work.plane[w, SLOPE_Y] + work.rail[w, side, SHIFT_SLOPE])
+    p_rate = x_c * yaw_rate - speed * slope - sign * (y_rate - z_c * roll_rate)
     N = contact.check[c, STIFFNESS] * p + contact.check[c, DAMPING] * p_rate
     work.force_rate[w] = max(work.force_rate[w], contact.check[c, STIFFNESS] * abs(p_rate))
     if N <= 0.0:
         return
     # the wheel's material at the contact: forward and down
-    spin, ahead = state[v + 4], -sign * lead
-    forward, down = speed + state[v] + spin * below, state[v + 2] - spin * ahead
+    spin, x = state[v + 4], -sign * x_c
+    forward, down = speed + state[v] + spin * z_c, state[v + 2] - spin * x
     slip = sqrt(forward * forward + down * down + SMALL_SLIP * SMALL_SLIP)
     friction = contact.check[c, FRICTION] * N / slip
     cy = sign * contact.check_wheel[w, c, BACK]
@@ -97,11 +97,11 @@ def check_rail(system, work, speed, state, w, c, flangeway, slope):
     force[b, 1] += fy
     force[b, 2] += fz
     if reach > 0.0:
-        force[b, 2] -= N * below * yaw * yaw / (size * reach)
+        force[b, 2] -= N * z_c * yaw * yaw / (size * reach)
     # of the normal force about the wheelset's own axes, so that it does no work on the spin
-    roll_moment = -below * fy
+    roll_moment = -z_c * fy
     force[b, 3] += roll_moment + cy * fz
-    force[b, 4] += yaw * roll_moment + below * fx - (ahead - yaw * cy) * fz
-    force[b, 5] += ahead * fy - cy * (fx + N * slope)
+    force[b, 4] += yaw * roll_moment + z_c * fx - (x - yaw * cy) * fz
+    force[b, 5] += x * fy - cy * (fx + N * slope)
     wheel[w, side, W_CHECK] += N
     wheel[w, side, W_CHECK_GAMMA] += friction * (forward * forward + down * down) / speed

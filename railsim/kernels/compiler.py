@@ -25,8 +25,8 @@ import numba
 from numba.core import config as _config
 from numba.extending import intrinsic, overload
 
-from railsim.kernels.cache import discard, notice, store, stored
-from railsim.kernels.lock import alone
+from railsim.kernels.cache import discard, load, store, warn_once
+from railsim.kernels.lock import exclusive
 
 try:
     from llvmlite.binding import Linkage, parse_bitcode
@@ -48,7 +48,7 @@ PRIVATE = not MISSING and os.environ.get("RAILSIM_PLAIN_NUMBA", "") in ("", "0")
 """Whether numba's private parts are used."""
 
 if MISSING:
-    notice(
+    warn_once(
         f"numba {numba.__version__} is not known to this railsim ({MISSING}): kernels are compiled "
         "by its public means, more slowly"
     )
@@ -157,10 +157,10 @@ if PRIVATE:
         if kws:
             return _resolve(function, context, args, kws)
         call = context, function, args
-        found = _resolved.get(call) or _resolve(function, context, args, kws)
-        if found is not None:  # nothing: another module may define it yet
-            _resolved[call] = found
-        return found
+        signature = _resolved.get(call) or _resolve(function, context, args, kws)
+        if signature is not None:  # nothing: another module may define it yet
+            _resolved[call] = signature
+        return signature
 
     BaseFunction.get_call_type = _resolve_once
 
@@ -235,10 +235,10 @@ class KernelCache:
         """Return the compiled function of a signature, or None."""
         codegen = target_context.codegen()
         path = self._path(signature, codegen)
-        data = stored(path)
+        data = load(path)
         if data is None:
-            self.until_stored.enter_context(alone(path.with_suffix(".lock")))
-            data = stored(path)  # by the process that was waited for
+            self.until_stored.enter_context(exclusive(path.with_suffix(".lock")))
+            data = load(path)  # by the process that was waited for
         if data is not None:
             rtsys.initialize(target_context)
             usual, codegen._library_class = codegen._library_class, _Stored
@@ -280,7 +280,7 @@ def entry(function: Any, *args: object) -> Any:
     return function.overloads[kinds].entry_point
 
 
-def compiled_by(function, folder, fastmath, *, python=True, allocates=False, **options):
+def compile_kernel(function, folder, fastmath, *, python=True, allocates=False, **options):
     """Compile a function, keeping the code in `folder`.
 
     Parameters
@@ -299,7 +299,7 @@ def compiled_by(function, folder, fastmath, *, python=True, allocates=False, **o
         Public options of `numba.njit`.
     """
     if not PRIVATE:
-        return _plainly(function, folder, fastmath, options)
+        return _compile_publicly(function, folder, fastmath, options)
     compiled = numba.njit(
         error_model="numpy",
         fastmath=fastmath,
@@ -319,16 +319,16 @@ def compiled_by(function, folder, fastmath, *, python=True, allocates=False, **o
     return compiled
 
 
-def _plainly(function, folder: Path | None, fastmath, options):
+def _compile_publicly(function, folder: Path | None, fastmath, options):
     """Compile by numba's public means; its own cache in the folder of these sources."""
-    before = _config.CACHE_DIR
+    user_folder = _config.CACHE_DIR
     try:
         if folder is not None:
             _config.CACHE_DIR = str(folder / "plain")
-        kept = folder is not None and Path(function.__code__.co_filename).is_file()
-        return numba.njit(error_model="numpy", fastmath=fastmath, cache=kept, **options)(function)
+        cached = folder is not None and Path(function.__code__.co_filename).is_file()
+        return numba.njit(error_model="numpy", fastmath=fastmath, cache=cached, **options)(function)
     finally:
-        _config.CACHE_DIR = before
+        _config.CACHE_DIR = user_folder
 
 
 def define_operator(operation, result_of, lower):

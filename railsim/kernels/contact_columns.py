@@ -2,7 +2,7 @@
 
 # rows of Work.patch: one column per active patch.  Angle and foot are in the plane of the rails:
 # position of the patch from the wheelset's centre for a rail along x, and its x per yaw; normal
-# and C in the track's axes, as is the direction of the rail at the patch, (1, turn_y, turn_z).
+# and C in the track's axes, as is the direction of the rail at the patch, (1, t_y, t_z).
 # Derivatives of the vertical force over the wheelset's y, z and roll, and that force times the turn
 # of the contact angle's tangent over y, for elastic rails.
 (
@@ -33,8 +33,8 @@
     FOOT_X,
     FOOT_Y,
     FOOT_Z,
-    TURN_Y,
-    TURN_Z,
+    TANGENT_Y,
+    TANGENT_Z,
     NORMAL_Y,
     NORMAL_Z,
     PATCH_SPEED,
@@ -45,7 +45,7 @@
     FORCE_PER_Y,
     FORCE_PER_Z,
     FORCE_PER_ROLL,
-    TURNING,
+    GEOMETRIC_STIFFNESS,
 ) = range(40)
 PATCH_ROWS = 40
 
@@ -75,12 +75,12 @@ WHEEL_COLUMNS = 13
 # forces with the friction that follows them; at walking pace the secants times c_y [N s], by the
 # slopes of the creep force in one direction over the slip in the other what the slip along takes
 # from the speeds in y, z and roll, and that times c_y
-J_ALONG, J_SECANT, J_SECANT_LEVER, J_SECANT_YAW, J_SLIP, J_NORMAL = 0, 1, 2, 3, 4, 10
-J_SECANT_ASIDE, J_CROSS, J_CROSS_YAW = 19, 20, 23
+J_ALONG, J_SECANT, J_SECANT_C_Z, J_SECANT_YAW, J_SLIP, J_NORMAL = 0, 1, 2, 3, 4, 10
+J_SECANT_C_Y, J_CROSS, J_CROSS_YAW = 19, 20, 23
 CONTACT_JACOBIAN = 26
 
 # columns of Work.bump, of each patch of the wheel at hand: e [m], its rate [m/s], e_phi [m], e_y
-# [1], change of the rate over `AHEAD` [m/s]; what is added to the radius [m]; where a rail's
+# [1], change of the rate over `HORIZON` [m/s]; what is added to the radius [m]; where a rail's
 # section changes, its rise [1], rates of K and K2 over s, lateral position of the wheel [m]
-B_HEIGHT, B_RATE, B_LEAD, B_ACROSS, B_CHANGE, B_RADIUS, B_RISE, B_K, B_K2, B_LEVER = range(10)
+B_HEIGHT, B_RATE, B_E_PHI, B_E_Y, B_CHANGE, B_RADIUS, B_RISE, B_K, B_K2, B_LEVER = range(10)
 BUMP_SIZE = 16

@@ -15,10 +15,11 @@ from railsim.kernels.contact_columns import (
     FORCE_PER_ROLL,
     FORCE_PER_Y,
     FORCE_PER_Z,
+    GEOMETRIC_STIFFNESS,
     J_CROSS,
     J_CROSS_YAW,
     J_NORMAL,
-    J_SECANT_ASIDE,
+    J_SECANT_C_Y,
     J_SLIP,
     NORMAL,
     NORMAL_DAMPING,
@@ -30,7 +31,6 @@ from railsim.kernels.contact_columns import (
     SLOPE_ALONG,
     T_X,
     T_Y,
-    TURNING,
 )
 from railsim.kernels.contact_table import (
     FLANGE_ROOT,
@@ -43,7 +43,7 @@ from railsim.kernels.contact_table import (
     K_Y,
     N_PATCH,
 )
-from railsim.kernels.lanes import LANES, load_lanes, spread, square_root, store_lanes, where_beyond
+from railsim.kernels.lanes import LANES, load_lanes, splat, square_root, store_lanes, where_beyond
 from railsim.kernels.support import (
     D_Y_SLIP,
     D_Z_SLIP,
@@ -59,19 +59,19 @@ from railsim.kernels.support import (
 # m/s, speed of travel below which the implicit part knows how creep forces in one direction follow
 # the slip in the others: without, steps in tight curves had to be up to 26 times as short.  Just
 # below the lowest speed of a class of runs, 1.2^6, so that all of a class do without
-WALKING = 2.98
+COUPLING_SPEED = 2.98
 # there the slope across is this share of the force over the slip at least: spin turns the force of
 # a patch that slides, which the slopes do not know
-LEAST_ACROSS = 0.2
+MIN_LATERAL_SLOPE = 0.2
 # static wheel loads up to which the gradients of the table count in full, to nothing at twice that
-HEAVY = 4.0
+GRADIENT_LOAD = 4.0
 # by how much a patch's change of stiffness may change its force, over its stiffness against the
 # vertical and over that along the motion
-LEAST, MOST = 0.03, 0.5
+VERTICAL_SHARE, MOTION_SHARE = 0.03, 0.5
 
 
 @compiled(python=False)
-def creep_slopes(n, patches, speed, G, along, across, secant_along):
+def estimate_creep_slopes(n, patches, speed, G, along, across, secant_along):
     """Slopes of the creep force along and across over the slip in that direction [N s/m].
 
     Those of the force mu N (1 - (1 - u/3)^3) in the direction of the linear one, u = |T_linear|/
@@ -92,7 +92,7 @@ def creep_slopes(n, patches, speed, G, along, across, secant_along):
     a, b, mu_N = patches.a, patches.b, patches.mu_N
     c11, c22, c23 = patches.c11, patches.c22, patches.c23
     xi_x, xi_y, phi = patches.xi_x, patches.xi_y, patches.phi
-    one, zero, per_speed = spread(1.0), spread(0.0), 1.0 / speed
+    one, zero, per_speed = splat(1.0), splat(0.0), 1.0 / speed
     for i in range(0, n, LANES):
         k11, k22, load = load_lanes(c11, i), load_lanes(c22, i), load_lanes(mu_N, i)
         ab = load_lanes(a, i) * load_lanes(b, i)
@@ -103,9 +103,9 @@ def creep_slopes(n, patches, speed, G, along, across, secant_along):
         y = limit * (k22 * load_lanes(xi_y, i) + spin)
         square = x * x + y * y
         u = square_root(square)
-        left = one - u * (1.0 / 3.0)
-        secant = where_beyond(u, 3.0, one / u, left + square * (1.0 / 27.0))
-        tangent = where_beyond(u, 3.0, zero, left * left)
+        v = one - u * (1.0 / 3.0)
+        secant = where_beyond(u, 3.0, one / u, v + square * (1.0 / 27.0))
+        tangent = where_beyond(u, 3.0, zero, v * v)
         share = x * x / (square + 1e-300)
         scale = where_beyond(load, 0.0, unit * per_speed, zero)
         store_lanes(along, i, scale * k11 * (secant + share * (tangent - secant)))
@@ -114,8 +114,8 @@ def creep_slopes(n, patches, speed, G, along, across, secant_along):
 
 
 @compiled(python=False)
-def begin_support(support, support_step):
-    """Nothing yet acts on the rails whose contact is evaluated."""
+def clear_support(support, support_step):
+    """Clear forces and slopes of the rails whose contact is evaluated."""
     for w in range(support.shape[0]):
         if support_step[w, SKIP] > 0.0:
             continue
@@ -125,7 +125,7 @@ def begin_support(support, support_step):
 
 
 @compiled(inline=True)
-def add_to_row(row, first, factor, vector):
+def add_scaled(row, first, factor, vector):
     """Add a factor times a vector to three entries of a row."""
     row[first] += factor * vector[0]
     row[first + 1] += factor * vector[1]
@@ -133,34 +133,34 @@ def add_to_row(row, first, factor, vector):
 
 
 @compiled(python=False)
-def couple_directions(system, work, n):
+def add_slip_coupling(system, work, n):
     """Add how `n` patches couple the speeds along the track, in yaw, and in y, z and roll.
 
     Slips of the wheel along, x' + c_z pitch' - c_y yaw', and across, c y' - s z' + arm roll'.  With
-    the slopes of `creep_slopes`, C22/C11 times the secant along being that across, the slope of the
-    force in one direction over the slip in the other one is the root of what both slopes are below
-    their secants, against the sign of T_x T_y.
+    the slopes of `estimate_creep_slopes`, C22/C11 times the secant along being that across, the
+    slope of the force in one direction over the slip in the other one is the root of what both
+    slopes are below their secants, against the sign of T_x T_y.
     """
     patch = work.patch
     for k in range(n):
         secant, across = patch[SECANT_ALONG, k], patch[SLOPE_ACROSS, k]
-        below = secant * patch[C22, k] / patch[C11, k] - across
-        below = max(0.0, below) * max(0.0, secant - patch[SLOPE_ALONG, k])
-        cross = -copysign(sqrt(below), patch[T_X, k] * patch[T_Y, k])
-        across = patch[SLOPE_ACROSS, k] = max(across, LEAST_ACROSS * secant)
+        square = secant * patch[C22, k] / patch[C11, k] - across
+        square = max(0.0, square) * max(0.0, secant - patch[SLOPE_ALONG, k])
+        cross = -copysign(sqrt(square), patch[T_X, k] * patch[T_Y, k])
+        across = patch[SLOPE_ACROSS, k] = max(across, MIN_LATERAL_SLOPE * secant)
         s, c, cy = patch[NORMAL_Y, k], patch[NORMAL_Z, k], patch[C_Y, k]
         if system.support.elastic:  # a rail that gives way is in series
             cross /= 1.0 + across * (c * c * work.compliance[0] + s * s * work.compliance[1])
         row = work.contact_jacobian[system.contact.body[work.patch_index[k, 0]]]
         direction = c, -s, -c * patch[C_Z, k] - s * cy
-        row[J_SECANT_ASIDE] += secant * cy
-        add_to_row(row, J_CROSS, cross, direction)
-        add_to_row(row, J_CROSS_YAW, cross * cy, direction)
+        row[J_SECANT_C_Y] += secant * cy
+        add_scaled(row, J_CROSS, cross, direction)
+        add_scaled(row, J_CROSS_YAW, cross * cy, direction)
 
 
 @compiled(python=False)
-def note_stiffness(system, work, w, n, k, sign, p, vertical):
-    """Note how the `vertical` force of patch `n` of wheelset `w` changes with motions.
+def store_patch_stiffness(system, work, w, n, k, sign, p, vertical):
+    """Store how the `vertical` force of patch `n` of wheelset `w` changes with motions.
 
     `k`: where the patch begins in `work.look_up`; `sign`: of the side; `p`: penetration [m].
     The stiffness K of the patch changes along the profile, by the gradients of the table; they lead
@@ -171,23 +171,23 @@ def note_stiffness(system, work, w, n, k, sign, p, vertical):
     patch[NORMAL_STIFFNESS, n] = stiffness / (patch[ANGLE_COS, n] * patch[ANGLE_COS, n])
     if not system.support.elastic:
         return
-    light = min(1.0, max(0.0, 2.0 - vertical / (HEAVY * system.contact.load[w])))
+    part = min(1.0, max(0.0, 2.0 - vertical / (GRADIENT_LOAD * system.contact.load[w])))
     along_y, along_roll = stiffness * t[k + G_Y], stiffness * t[k + G_ROLL]
-    K_y = light * p * root * (t[k + K_Y] + root * t[k + K2_Y])
-    K_roll = light * p * root * (t[k + K_ROLL] + root * t[k + K2_ROLL])
-    most_y = LEAST * stiffness + MOST * abs(along_y)
-    most_roll = LEAST * stiffness + MOST * abs(along_roll)
-    patch[FORCE_PER_Y, n] = sign * (max(-most_y, min(most_y, K_y)) - along_y)
+    K_y = part * p * root * (t[k + K_Y] + root * t[k + K2_Y])
+    K_roll = part * p * root * (t[k + K_ROLL] + root * t[k + K2_ROLL])
+    limit_y = VERTICAL_SHARE * stiffness + MOTION_SHARE * abs(along_y)
+    limit_roll = VERTICAL_SHARE * stiffness + MOTION_SHARE * abs(along_roll)
+    patch[FORCE_PER_Y, n] = sign * (max(-limit_y, min(limit_y, K_y)) - along_y)
     patch[FORCE_PER_Z, n] = stiffness
-    patch[FORCE_PER_ROLL, n] = sign * (max(-most_roll, min(most_roll, K_roll)) - along_roll)
-    patch[TURNING, n] = -light * vertical * t[k + G_YY]
+    patch[FORCE_PER_ROLL, n] = sign * (max(-limit_roll, min(limit_roll, K_roll)) - along_roll)
+    patch[GEOMETRIC_STIFFNESS, n] = -part * vertical * t[k + G_YY]
 
 
 @compiled(python=False)
-def couple_stiffness(work, coupling, table, begin, n):
+def couple_patch_stiffness(work, coupling, table, begin, n):
     """Forces per motion of patches `begin` to `n` of a wheel, which load each other's surface.
 
-    With the approaches of `coupled_approaches`, N_i changes by n_i k_i = dN_i/de_i times the motion
+    With the approaches of `couple_approaches`, N_i changes by n_i k_i = dN_i/de_i times the motion
     less that part of it by which the neighbours' forces bend the surface: dN_i = k_i (n_i d - sum_j
     kappa_ij dN_j).  The flange root has two neighbours, each of these only the root.
     """
@@ -205,17 +205,17 @@ def couple_stiffness(work, coupling, table, begin, n):
         k_a, k_b = a * patch[FORCE_PER_Z, before], b * patch[FORCE_PER_Z, after]
         pivot = max(1.0 - k * (a * k_a + b * k_b), 0.1)
         for row in (FORCE_PER_Y, FORCE_PER_Z, FORCE_PER_ROLL):
-            own = (patch[row, i] - k * (a * patch[row, before] + b * patch[row, after])) / pivot
-            patch[row, i] = own
+            slope = (patch[row, i] - k * (a * patch[row, before] + b * patch[row, after])) / pivot
+            patch[row, i] = slope
             if a > 0.0:
-                patch[row, before] -= k_a * own
+                patch[row, before] -= k_a * slope
             if b > 0.0:
-                patch[row, after] -= k_b * own
+                patch[row, after] -= k_b * slope
 
 
 @compiled(python=False)
-def add_slopes(work, w, side, k, across, shear):
-    """Add to the derivatives of the forces on a rail what patch `k` contributes.
+def add_rail_slopes(work, w, side, k, across, shear):
+    """Add patch `k` to the derivatives of the forces on a rail.
 
     By a motion of the wheel in y, z and roll its vertical force V changes by the rows `FORCE_PER_Y`
     to `FORCE_PER_ROLL`, and Y = V tan g + T_y cos g and Q = V - T_y sin g with it, the creep force
@@ -237,15 +237,15 @@ def add_slopes(work, w, side, k, across, shear):
     stiffness, damping = patch[NORMAL_STIFFNESS, k], patch[NORMAL_DAMPING, k]
     arm = -c * cz - s * cy  # of the tangent about the wheelset's centre
     contact, normal = work.support[w, side], (s, c, c * cy - s * cz)
-    add_to_row(contact, K, f_y / c, per_motion)
-    add_to_row(contact, K + 3, f_z / c, per_motion)
-    turning = abs(s) * patch[TURNING, k]
-    contact[K] += turning
-    contact[K + 2] -= shear * turning
-    add_to_row(contact, D, damping * f_y, normal)
-    add_to_row(contact, D + 3, damping * f_z, normal)
-    add_to_row(contact, D, across * c, (c, -s, arm))
-    add_to_row(contact, D + 3, -across * s, (c, -s, arm))
+    add_scaled(contact, K, f_y / c, per_motion)
+    add_scaled(contact, K + 3, f_z / c, per_motion)
+    geometric = abs(s) * patch[GEOMETRIC_STIFFNESS, k]
+    contact[K] += geometric
+    contact[K + 2] -= shear * geometric
+    add_scaled(contact, D, damping * f_y, normal)
+    add_scaled(contact, D + 3, damping * f_z, normal)
+    add_scaled(contact, D, across * c, (c, -s, arm))
+    add_scaled(contact, D + 3, -across * s, (c, -s, arm))
     contact[D_Y_SLIP] += across
     contact[D_Z_SLIP] -= across * s / c
     contact[FOOT_Y_STIFFNESS] += stiffness * cy
@@ -254,8 +254,8 @@ def add_slopes(work, w, side, k, across, shear):
 
 
 @compiled(python=False)
-def add_damping(work, b, k, across, damping):
-    """Add what patch `k` takes from the wheelset's speeds in y, z and roll.
+def add_wheelset_damping(work, b, k, across, damping):
+    """Add the damping of the wheelset's speeds in y, z and roll by patch `k`.
 
     Across, -T_y t with the slope `across` of the creep law; along the normal, -(N n + T_y t) with
     the contact `damping`, the creep force being nearly proportional to N.
@@ -273,6 +273,6 @@ def add_damping(work, b, k, across, damping):
     row[J_SLIP + 5] += across * arm * arm
     share = patch[T_Y, k] / patch[NORMAL, k]
     normal = s, c, lever
-    add_to_row(row, J_NORMAL, damping * (s + share * c), normal)
-    add_to_row(row, J_NORMAL + 3, damping * (c - share * s), normal)
-    add_to_row(row, J_NORMAL + 6, damping * (lever + share * arm), normal)
+    add_scaled(row, J_NORMAL, damping * (s + share * c), normal)
+    add_scaled(row, J_NORMAL + 3, damping * (c - share * s), normal)
+    add_scaled(row, J_NORMAL + 6, damping * (lever + share * arm), normal)

@@ -16,7 +16,7 @@ continuously differentiable) and are interpolated linearly in w, whose nodes lie
 where vehicles run, and continued linearly beyond the last of them.  The contact force is the
 gradient of U = 2/5 K e^(5/2) + 1/3 K2 e^3 *through this spline*, hence conservative by
 construction, whatever the table holds.  Only the first four fields, those of the force, have
-gradients.  Stiffness and width of a patch are continued as far as `continue_limited` lets them.
+gradients.  Stiffness and width of a patch are continued as far as `sum_nodes_limited` lets them.
 
 The first axis of the grid is s = y - shear * roll, the lateral displacement of the wheel's foot,
 see `railsim.contact.table`.
@@ -29,8 +29,8 @@ import numba
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.branches import rarely
-from railsim.kernels.contact_table_simd import sum_of_nodes
+from railsim.kernels.branches import unlikely
+from railsim.kernels.contact_table_simd import sum_nodes
 from railsim.kernels.record import record
 
 TREAD, FLANGE_ROOT, FLANGE = range(3)
@@ -56,20 +56,20 @@ INSIDE, BELOW_Y, ABOVE_Y, OUTSIDE_ROLL, OUTSIDE_W = range(5)
 # A patch whose gap exceeds the wheel's height by more than this is skipped; it is taken at a node
 # in y and between two in roll and w, which differs from the exact one by less (a cell at a slope of
 # 3).
-FAR = 4.0e-4
+FAR_GAP = 4.0e-4
 FINE_ROLL = 4e-3  # up to about this roll the nodes lie as close as in the middle [rad]
 
 LOADS = (14e3, 45e3, 110e3)  # normal loads whose energies the table meets [N]
 HALF_LOAD = 35e3  # half of the differences over the load have come [N]
 MIDDLE_SHARE = LOADS[1] / (LOADS[1] + HALF_LOAD)
 
-MOST_ITERATIONS = 30  # of `coupled_approaches`; some four are needed
+MAX_ITERATIONS = 30  # of `couple_approaches`; some four are needed
 # Relative change of the approaches below which they have converged: Newton squares it once more.
-SETTLED = 1e-8
-FURTHEST_W = 2.0  # over the last node of w: as far is the table continued
+TOLERANCE = 1e-8
+MAX_W = 2.0  # over the last node of w: as far is the table continued
 # Least share of the last node's stiffness and width that a continued patch keeps; root of the
 # penetration at which stiffness is judged beside that at none [m^0.5].
-LEAST_SHARE, JUDGED_AT = 0.5, 0.01
+MIN_SHARE, ROOT_DEPTH = 0.5, 0.01
 
 
 @record
@@ -125,7 +125,7 @@ def stretched_roll(roll):
 
 
 @compiled
-def locate(contact, table, y, roll, stretched, w):
+def find_cell(contact, table, y, roll, stretched, w):
     """Cell and local coordinate in the three directions; a code if outside (see above)."""
     ty = (y - contact.shear[table] * roll - contact.y0) / contact.dy
     tr = (stretched - contact.roll0) / contact.droll
@@ -139,7 +139,7 @@ def locate(contact, table, y, roll, stretched, w):
         return ABOVE_Y, 0, 0, 0, 0.0, 0.0, 0.0
     if not (tr >= 1.0 and tr < shape[3] - 2.0):
         return OUTSIDE_ROLL, 0, 0, 0, 0.0, 0.0, 0.0
-    if not w <= FURTHEST_W * nodes[last + 1]:
+    if not w <= MAX_W * nodes[last + 1]:
         return OUTSIDE_W, 0, 0, 0, 0.0, 0.0, 0.0
     iy = int(ty)
     ir = int(tr)
@@ -152,15 +152,15 @@ def locate(contact, table, y, roll, stretched, w):
 
 @compiled(python=False)
 def gap_curvature(contact, table, patch, iy, ir, iw, ty, tw, weights):
-    """Second derivative of a patch's gap over y [1/m], the weights from `cell_weights`."""
+    """Second derivative of a patch's gap over y [1/m], the weights from `set_cell_weights`."""
     values = contact.values
     second = 1.0 - ty, 3.0 * ty - 2.0, 1.0 - 3.0 * ty, ty
     total = 0.0
     for row in range(4):
         for k in range(4):
             r, y = ir - 1 + row, iy - 1 + k
-            here, yawed = values[table, patch, iw, r, y, G], values[table, patch, iw + 1, r, y, G]
-            total += weights[8 + row] * second[k] * (here + tw * (yawed - here))
+            g_0, g_1 = values[table, patch, iw, r, y, G], values[table, patch, iw + 1, r, y, G]
+            total += weights[8 + row] * second[k] * (g_0 + tw * (g_1 - g_0))
     return total / (contact.dy * contact.dy)
 
 
@@ -170,11 +170,11 @@ def is_far(contact, table, patch, iy, ir, iw, tr, tw, z):
     values = contact.values
     node, following = values[table, patch, iw, ir, iy, 0], values[table, patch, iw, ir + 1, iy, 0]
     yawed = values[table, patch, iw + 1, ir, iy, 0]
-    return z - node - tr * (following - node) - tw * (yawed - node) < -FAR
+    return z - node - tr * (following - node) - tw * (yawed - node) < -FAR_GAP
 
 
 @compiled(python=False)
-def spline_weights(t, per_step, weights, first):
+def set_spline_weights(t, per_step, weights, first):
     """Four weights of the uniform cubic B-spline at t in [0, 1), four of its derivative.
 
     The derivative is over the coordinate whose grid has 1/`per_step` between nodes.
@@ -192,17 +192,17 @@ def spline_weights(t, per_step, weights, first):
 
 
 @compiled
-def cell_weights(contact, ty, tr, roll_slope, weights):
+def set_cell_weights(contact, ty, tr, roll_slope, weights):
     """Weights of a cell's nodes, the same for all patches of a wheel, into ``weights[16]``.
 
     `roll_slope` as from `stretched_roll`.
     """
-    spline_weights(ty, 1.0 / contact.dy, weights, 0)
-    spline_weights(tr, roll_slope / contact.droll, weights, 8)
+    set_spline_weights(ty, 1.0 / contact.dy, weights, 0)
+    set_spline_weights(tr, roll_slope / contact.droll, weights, 8)
 
 
-def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, offset):
-    """Do what `contact_table_simd.sum_of_nodes` does."""
+def _sum_nodes_plain(values, first, row, slab, weights, tw, out, offset):
+    """Do what `contact_table_simd.sum_nodes` does."""
     flat = values.reshape(-1)
     starts = first + slab * np.arange(2)[:, None, None] + row * np.arange(4)[:, None]
     index = starts + N_FIELD * np.arange(4)
@@ -222,38 +222,38 @@ def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, offset):
     out[offset : offset + G_YY] = np.concatenate(sums)
 
 
-_sum_of_nodes = _sum_of_nodes_plain if numba.config.DISABLE_JIT else sum_of_nodes
+_sum_nodes = _sum_nodes_plain if numba.config.DISABLE_JIT else sum_nodes
 
 
 @compiled(inline=True)
-def allowed_part(there, there_y, there_roll, here, here_y, here_roll):
+def continuation_share(edge, edge_y, edge_roll, value, value_y, value_roll):
     """Part of the way from a value at the last node to its continuation that is gone.
 
     With its derivatives after y and roll, from those of both values.
     """
-    least = LEAST_SHARE * there
-    if there <= 0.0 or here >= least:
+    least = MIN_SHARE * edge
+    if edge <= 0.0 or value >= least:
         return 1.0, 0.0, 0.0
-    fall = there - here
-    gain = (there - least) / (there * fall * fall)
-    part_y = gain * (there * here_y - here * there_y)
-    return (there - least) / fall, part_y, gain * (there * here_roll - here * there_roll)
+    fall = edge - value
+    gain = (edge - least) / (edge * fall * fall)
+    share_y = gain * (edge * value_y - value * edge_y)
+    return (edge - least) / fall, share_y, gain * (edge * value_roll - value * edge_roll)
 
 
 @compiled(python=False)
-def continue_limited(values, start, row, slab, weights, tw, out, first):
-    """Do what `_sum_of_nodes` does, beyond the last node of w.
+def sum_nodes_limited(values, start, row, slab, weights, tw, out, first):
+    """Do what `_sum_nodes` does, beyond the last node of w.
 
     A flange that is yawed comes to touch far ahead, where stiffness and width of its patch fall
     fast: along a straight line they would become negative, and the forces no numbers.  They go no
     further than to a share of what they are at the last node, the stiffness at no penetration and
-    at `JUDGED_AT`; its gradients are those of what is left.
+    at `ROOT_DEPTH`; its gradients are those of what is left.
     """
-    _sum_of_nodes(values, start, row, slab, weights, 1.0, out, first)
+    _sum_nodes(values, start, row, slab, weights, 1.0, out, first)
     k, k_y, k_roll = out[first + K], out[first + K_Y], out[first + K_ROLL]
     k2, k2_y, k2_roll = out[first + K2], out[first + K2_Y], out[first + K2_ROLL]
     a1, b1, d_b1 = out[first + A1], out[first + B1], out[first + D_B1]
-    _sum_of_nodes(values, start, row, slab, weights, tw, out, first)
+    _sum_nodes(values, start, row, slab, weights, tw, out, first)
     fall, fall_y, fall_roll = (
         out[first + K] - k,
         out[first + K_Y] - k_y,
@@ -261,48 +261,48 @@ def continue_limited(values, start, row, slab, weights, tw, out, first):
     )
     fall2, fall2_y = out[first + K2] - k2, out[first + K2_Y] - k2_y
     fall2_roll = out[first + K2_ROLL] - k2_roll
-    part, part_y, part_roll = allowed_part(
+    share, share_y, share_roll = continuation_share(
         k, k_y, k_roll, out[first + K], out[first + K_Y], out[first + K_ROLL]
     )
-    other, other_y, other_roll = allowed_part(
-        k + JUDGED_AT * k2, k_y + JUDGED_AT * k2_y, k_roll + JUDGED_AT * k2_roll,
-        out[first + K] + JUDGED_AT * out[first + K2],
-        out[first + K_Y] + JUDGED_AT * out[first + K2_Y],
-        out[first + K_ROLL] + JUDGED_AT * out[first + K2_ROLL],
+    share_2, share_2_y, share_2_roll = continuation_share(
+        k + ROOT_DEPTH * k2, k_y + ROOT_DEPTH * k2_y, k_roll + ROOT_DEPTH * k2_roll,
+        out[first + K] + ROOT_DEPTH * out[first + K2],
+        out[first + K_Y] + ROOT_DEPTH * out[first + K2_Y],
+        out[first + K_ROLL] + ROOT_DEPTH * out[first + K2_ROLL],
     )  # fmt: skip
-    if other < part:
-        part, part_y, part_roll = other, other_y, other_roll
-    if part < 1.0:
-        out[first + K] = k + part * fall
-        out[first + K_Y] = k_y + part * fall_y + part_y * fall
-        out[first + K_ROLL] = k_roll + part * fall_roll + part_roll * fall
-        out[first + K2] = k2 + part * fall2
-        out[first + K2_Y] = k2_y + part * fall2_y + part_y * fall2
-        out[first + K2_ROLL] = k2_roll + part * fall2_roll + part_roll * fall2
+    if share_2 < share:
+        share, share_y, share_roll = share_2, share_2_y, share_2_roll
+    if share < 1.0:
+        out[first + K] = k + share * fall
+        out[first + K_Y] = k_y + share * fall_y + share_y * fall
+        out[first + K_ROLL] = k_roll + share * fall_roll + share_roll * fall
+        out[first + K2] = k2 + share * fall2
+        out[first + K2_Y] = k2_y + share * fall2_y + share_y * fall2
+        out[first + K2_ROLL] = k2_roll + share * fall2_roll + share_roll * fall2
         out[first + K_W] = out[first + K2_W] = 0.0
     narrowest = min(out[first + B1], out[first + B1] + out[first + D_B1])
-    part, _, _ = allowed_part(min(b1, b1 + d_b1), 0.0, 0.0, narrowest, 0.0, 0.0)
-    if part < 1.0:
-        out[first + A1] = a1 + part * (out[first + A1] - a1)
-        out[first + B1] = b1 + part * (out[first + B1] - b1)
-        out[first + D_B1] = d_b1 + part * (out[first + D_B1] - d_b1)
+    share, _, _ = continuation_share(min(b1, b1 + d_b1), 0.0, 0.0, narrowest, 0.0, 0.0)
+    if share < 1.0:
+        out[first + A1] = a1 + share * (out[first + A1] - a1)
+        out[first + B1] = b1 + share * (out[first + B1] - b1)
+        out[first + D_B1] = d_b1 + share * (out[first + D_B1] - d_b1)
 
 
 @compiled
 def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
     """Fields of one patch and their gradients into ``out[first:first + LOOK_UP_SIZE]``.
 
-    `weights` as from `cell_weights`; the gradient of a1 is that of the table's own coordinates.
+    `weights` as from `set_cell_weights`; the gradient of a1 is that of the table's own coordinates.
     """
     shape = contact.values.shape
     row = shape[4] * N_FIELD
     slab = shape[3] * row
     start = ((table * N_PATCH + patch) * shape[2] + iw) * slab + (ir - 1) * row
     start += (iy - 1) * N_FIELD
-    if rarely(tw > 1.0):
-        continue_limited(contact.values, start, row, slab, weights, tw, out, first)
+    if unlikely(tw > 1.0):
+        sum_nodes_limited(contact.values, start, row, slab, weights, tw, out, first)
     else:
-        _sum_of_nodes(contact.values, start, row, slab, weights, tw, out, first)
+        _sum_nodes(contact.values, start, row, slab, weights, tw, out, first)
     out[first + G_YY] = 0.0
     shear = contact.shear[table]
     out[first + G_ROLL] -= shear * out[first + G_Y]
@@ -315,7 +315,7 @@ def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
 
 
 @compiled
-def under_load(t, first, vertical):
+def patch_under_load(t, first, vertical):
     """Position, direction and ellipse of a patch under a load, from a look-up at `t[first:]`.
 
     The ellipse of a given curvature along the rail is the longer the narrower it is, about as
@@ -340,7 +340,7 @@ def under_load(t, first, vertical):
 
 
 @compiled
-def coupled_approaches(coupling, table, stiffness, approach):
+def couple_approaches(coupling, table, stiffness, approach):
     """Take from the penetrations what the neighbours' loads bend the surfaces.
 
     With e_i the patches' own approaches and N_i = K_i e_i^(3/2) + K2_i e_i^2,
@@ -362,7 +362,7 @@ def coupled_approaches(coupling, table, stiffness, approach):
     if e1 > 0.0 and (e0 > 0.0 or e2 > 0.0):
         k0, k1, k2 = stiffness[0], stiffness[1], stiffness[2]
         c0, c1, c2 = stiffness[3], stiffness[4], stiffness[5]
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             s0, s1, s2 = sqrt(e0), sqrt(e1), sqrt(e2)
             n0, n1, n2 = k0 + c0 * s0, k1 + c1 * s1, k2 + c2 * s2
             d0 = s0 * (1.5 * n0 + 0.5 * c0 * s0)
@@ -379,9 +379,9 @@ def coupled_approaches(coupling, table, stiffness, approach):
             x0 = on0 * (r0 - a * d1 * x1)
             x2 = on2 * (r2 - b * d1 * x1)
             e0, e1, e2 = max(e0 - x0, 0.0), max(e1 - x1, 0.0), max(e2 - x2, 0.0)
-            if abs(x0) + abs(x1) + abs(x2) < SETTLED * (e0 + e1 + e2):
+            if abs(x0) + abs(x1) + abs(x2) < TOLERANCE * (e0 + e1 + e2):
                 break
-    # one that is apart keeps its distance, by which a strike is foreseen
+    # one that is apart keeps its distance, by which a strike is predicted
     approach[0] = e0 if p0 > 0.0 else p0
     approach[1] = e1 if p1 > 0.0 else p1
     approach[2] = e2 if p2 > 0.0 else p2

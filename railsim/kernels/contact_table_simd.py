@@ -6,7 +6,7 @@ again for each patch; here every node is two registers, one with four fields twi
 stay in registers.  Gain: docs/performance.md.  Any processor will do: the instructions are generic
 vectors that LLVM cuts to what it has.
 
-The same in plain Python is :func:`railsim.kernels.contact_table._sum_of_nodes_plain`, used where
+The same in plain Python is :func:`railsim.kernels.contact_table._sum_nodes_plain`, used where
 compilation is switched off; a test holds both to the same result.
 """
 
@@ -20,7 +20,7 @@ _GRADIENT, _VALUE = 4, 8  # fields with and without gradients
 
 
 @intrinsic
-def sum_of_nodes(typingctx, values, first, row, slab, weights, tw, out, offset):
+def sum_nodes(typingctx, values, first, row, slab, weights, tw, out, offset):
     """Write to ``out[offset:offset + 24]`` values, then of the first four slopes and differences.
 
     Twelve values, slopes over y and over roll, difference over w.

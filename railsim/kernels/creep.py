@@ -10,15 +10,15 @@ from . import compiled
 from .creep_laws import adhesion_curve, fastrip, linear_saturated, polach
 from .creep_table import table_forces
 from .fastsim import fastsim
-from .own_laws import own_creep_law
+from .user_laws import user_creep_law
 
 # numbers of the laws, as in `railsim.definitions.creep_law.CREEP_LAWS`
 FASTSIM, TABLE, FASTRIP, POLACH, LINEAR, ADHESION_CURVE = range(6)
-OWN = -1
+USER = -1
 
 
 @compiled
-def falling_friction(n, patches, speed, rest, decay):
+def reduce_friction(n, patches, speed, A, B):
     """Reduce the friction of n patches with the slip velocity (Polach 2005).
 
     mu(w) = mu_0 ((1 - A) exp(-B w) + A), w = speed sqrt(xi_x^2 + xi_y^2).
@@ -31,10 +31,10 @@ def falling_friction(n, patches, speed, rest, decay):
         Read: creepages; changed: mu_N, on return that at the patch's slip.
     speed : ndarray, shape (>= n,)
         Speed along the rail that the creepages refer to [m/s].
-    rest : float
-        A: friction at very large slip over that at rest, 0..1 [1].
-    decay : float
-        B >= 0 [s/m].
+    A : float
+        Friction at very large slip over that at rest, 0..1 [1].
+    B : float
+        At least 0 [s/m].
 
     Notes
     -----
@@ -43,7 +43,7 @@ def falling_friction(n, patches, speed, rest, decay):
     mu_N, xi_x, xi_y = patches.mu_N, patches.xi_x, patches.xi_y
     for i in range(n):
         slip = speed[i] * math.sqrt(xi_x[i] * xi_x[i] + xi_y[i] * xi_y[i])
-        mu_N[i] *= (1.0 - rest) * math.exp(-decay * slip) + rest
+        mu_N[i] *= (1.0 - A) * math.exp(-B * slip) + A
 
 
 @compiled
@@ -75,4 +75,4 @@ def creep_forces(n, law, patches, scratch):
     elif law.number == ADHESION_CURVE:
         adhesion_curve(n, patches, law.curve)
     else:
-        own_creep_law(n, patches, law, G)
+        user_creep_law(n, patches, law, G)

@@ -105,8 +105,8 @@ def polach(n, patches, G, k_adhesion, k_slip):
                 T_x[i] = bound
             continue
         area = a[i] * b[i]
-        spun = xi_y[i] + phi[i] * a[i]
-        lateral = spun if abs(spun) > abs(xi_y[i]) else xi_y[i]
+        xi_yc = xi_y[i] + phi[i] * a[i]
+        lateral = xi_yc if abs(xi_yc) > abs(xi_y[i]) else xi_y[i]
         s = math.sqrt(xi_x[i] * xi_x[i] + lateral * lateral) + _TINY
         plain = math.sqrt(xi_x[i] * xi_x[i] + xi_y[i] * xi_y[i]) + _TINY
         c = math.sqrt((c11[i] * xi_x[i]) ** 2 + (c22[i] * xi_y[i]) ** 2) / plain
@@ -181,7 +181,7 @@ def adhesion_curve(n, patches, curve):
 
 @compiled(python=False)
 def _fastrip_strips(n, nx, ny, patches, G, work):
-    """Prepare the strips of all patches for `_fastrip_march`.
+    """Prepare the strips of all patches for `_fastrip_cell`.
 
     Rows of work: 0 to 2 growth per cell of the direction's traction (x and y at the middle, y by
     spin times x/l); 3 end of the slip zone, x/l; 4, 5 state of the direction's traction, 6 whether
@@ -295,12 +295,12 @@ def _stick_zone(kappa, lam_d, psi, d):
 
 
 @compiled(python=False)
-def _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work):
+def _fastrip_cell(m, x_front, x_rear, x_slip, step, ellipse, work):
     """One cell of all m strips: FASTSIM's direction, and its share of the slip zone added up."""
     grow_x, grow_y, grow_s, slip_end = work[0], work[1], work[2], work[3]
     fx, fy, at_bound = work[4], work[5], work[6]
     sum_x, sum_y, sum_m, partial = work[7], work[8], work[9], work[10]
-    x_cell = 0.5 * (lead + trail)
+    x_cell = 0.5 * (x_front + x_rear)
     parabola = 1.0 - x_cell * x_cell
     for c in range(m):
         gx = grow_x[c]
@@ -319,7 +319,7 @@ def _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work):
         fy[c] = y
         at_bound[c] = mode
         end = slip_end[c]
-        slides = ellipse if end >= lead else (partial[c] if end > trail else 0.0)
+        slides = ellipse if end >= x_front else (partial[c] if end > x_rear else 0.0)
         factor = slides / (size * cut) if mode > 0.5 else slides / parabola
         sum_x[c] += factor * x
         sum_y[c] += factor * y
@@ -353,10 +353,10 @@ def fastrip(n, nx, ny, patches, G, work):
     m = n * ny
     half = 1.0 / nx
     for k in range(nx):
-        lead, trail = 1.0 - 2.0 * k * half, 1.0 - 2.0 * (k + 1) * half
-        ellipse = _ellipse_area(lead) - _ellipse_area(trail)
-        x_slip, step = (1.0 - 0.5 * half, 0.5) if k == 0 else (lead, 1.0)
-        _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work)
+        x_front, x_rear = 1.0 - 2.0 * k * half, 1.0 - 2.0 * (k + 1) * half
+        ellipse = _ellipse_area(x_front) - _ellipse_area(x_rear)
+        x_slip, step = (1.0 - 0.5 * half, 0.5) if k == 0 else (x_front, 1.0)
+        _fastrip_cell(m, x_front, x_rear, x_slip, step, ellipse, work)
     across = 0.0
     for j in range(ny):
         eta = (2 * j + 1 - ny) / ny

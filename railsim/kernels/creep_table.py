@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from . import compiled
-from .creep_table_simd import sum_of_rows
+from .creep_table_simd import sum_rows
 
 RATIO_MAX = 20.0  # the table covers 1/20 <= a/b <= 20
 N_RATIO, N_THETA, N_PSI, N_T = 14, 9, 20, 20  # intervals of log(a/b), theta, psi, t
@@ -80,7 +80,7 @@ def _angle(y, x):
 
 
 @compiled(python=False)
-def _along_ratio(scale, r, column, r0, r1, r2, r3):
+def _ratio_spline(scale, r, column, r0, r1, r2, r3):
     """Factor of a creepage in q at the node r in log(a/b)."""
     return (
         r0 * scale[r, column] + r1 * scale[r + 1, column]
@@ -88,8 +88,8 @@ def _along_ratio(scale, r, column, r0, r1, r2, r3):
     )  # fmt: skip
 
 
-def _sum_of_rows_plain(table, start, strides, weights, first, sums):
-    """Do what `creep_table_simd.sum_of_rows` does."""
+def _sum_rows_plain(table, start, strides, weights, first, sums):
+    """Do what `creep_table_simd.sum_rows` does."""
     weights = weights.ravel()[first : first + 12]
     total = np.zeros(16)
     for i in range(4):
@@ -100,7 +100,7 @@ def _sum_of_rows_plain(table, start, strides, weights, first, sums):
     sums.ravel()[:16] = total
 
 
-_sum_of_rows = _sum_of_rows_plain if numba.config.DISABLE_JIT else sum_of_rows
+_sum_rows = _sum_rows_plain if numba.config.DISABLE_JIT else sum_rows
 
 
 @compiled
@@ -153,9 +153,9 @@ def table_forces(n, patches, G, table, scale, scratch):
             r, r0, r1, r2, r3 = _weights((log_ratio / _LOG_MAX + 1.0) * (0.5 * N_RATIO), N_RATIO)
             unit = G * a[i] * b[i] / mu_N[i]
             size = math.sqrt(a[i] * b[i])
-            qx = unit * _along_ratio(scale, r, 0, r0, r1, r2, r3) * xi_x[i]
-            qy = unit * _along_ratio(scale, r, 1, r0, r1, r2, r3) * xi_y[i]
-            qs = unit * _along_ratio(scale, r, 2, r0, r1, r2, r3) * size * phi[i]
+            qx = unit * _ratio_spline(scale, r, 0, r0, r1, r2, r3) * xi_x[i]
+            qy = unit * _ratio_spline(scale, r, 1, r0, r1, r2, r3) * xi_y[i]
+            qs = unit * _ratio_spline(scale, r, 2, r0, r1, r2, r3) * size * phi[i]
             # reversal and mirror image: a quarter of all directions is enough
             turn_x = -1.0 if qx < 0.0 else 1.0
             turn_y = -1.0 if qs < 0.0 else 1.0
@@ -191,7 +191,7 @@ def table_forces(n, patches, G, table, scale, scratch):
         for m in range(count):
             i = first + m
             row, at = 1 + (m >> 2), (m & 3) * _RECORD
-            _sum_of_rows(table, offsets[m], (_IN_RATIO, _IN_THETA, _IN_PSI), work,
+            _sum_rows(table, offsets[m], (_IN_RATIO, _IN_THETA, _IN_PSI), work,
                          row * width + at, work)  # fmt: skip
             x = y = z = 0.0
             for k in range(4):

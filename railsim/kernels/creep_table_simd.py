@@ -4,7 +4,7 @@ Why this exists: the look-up adds 64 rows of 16 numbers each.  Left to the compi
 memory and back with every row (some 400 ns a patch); here they stay in registers.  Any processor
 will do: the instructions are generic vectors that LLVM cuts to what it has.
 
-The same in plain Python is :func:`railsim.kernels.creep_table._sum_of_rows_plain`, used where
+The same in plain Python is :func:`railsim.kernels.creep_table._sum_rows_plain`, used where
 compilation is switched off; a test holds both to the same result.
 """
 
@@ -20,7 +20,7 @@ _FLOATS = ir.VectorType(ir.FloatType(), LANES)
 
 
 @intrinsic
-def sum_of_rows(typingctx, table, start, strides, weights, first, sums):
+def sum_rows(typingctx, table, start, strides, weights, first, sums):
     """Write to sums (16) the sum over i, j, k < 4 of three weights times a row of 16 numbers.
 
     The row begins at table[start + i strides[0] + j strides[1] + k strides[2]]; the weights are

@@ -16,8 +16,8 @@ from railsim.kernels.contact_columns import (
     PATCH_SPEED,
     PHI,
     RISE,
-    TURN_Y,
-    TURN_Z,
+    TANGENT_Y,
+    TANGENT_Z,
     XI_X,
     XI_Y,
 )
@@ -38,7 +38,7 @@ from railsim.kernels.track_frame import OMEGA
 
 
 @compiled(python=False)
-def creepages(system, work, n, speed, state):
+def set_creepages(system, work, n, speed, state):
     """Positions and creepages of the active patches, see the module's equations."""
     patch, C, frames, plane = work.patch, work.relative, work.frames, work.plane
     n_bodies = system.bodies.kind.shape[0]
@@ -61,21 +61,21 @@ def creepages(system, work, n, speed, state):
         cz = sine * patch[FOOT_Y, k] + cosine * patch[FOOT_Z, k]
         s = cosine * patch[ANGLE_SIN, k] - sine * patch[ANGLE_COS, k]
         c = cosine * patch[ANGLE_COS, k] + sine * patch[ANGLE_SIN, k]
-        # direction of the rail at the patch, (1, turn_y, turn_z); the patch leads accordingly
+        # direction of the rail at the patch, (1, t_y, t_z); the patch leads accordingly
         slope = work.rail[w, side, RAIL_SLOPE]
         cx = patch[FOOT_X, k] - slope * cy
         roll_slope = plane[w, ROLL_SLOPE]
-        turn_z = (
+        t_z = (
             w1 * (y + cy)
             - w2 * (x + cx)
             + plane[w, SLOPE_Z]
             + roll_slope * (y + cy - plane[w, MIDDLE_Y])
             - patch[RISE, k]
         )
-        cx -= turn_z * cz
-        more = w3 * (x + cx) - w1 * (z + cz) - roll_slope * (z + cz - plane[w, MIDDLE_Z])
-        turn_y = slope + more
-        cx -= (patch[FOOT_X_PER_YAW, k] + cy) * more
+        cx -= t_z * cz
+        frame_turn = w3 * (x + cx) - w1 * (z + cz) - roll_slope * (z + cz - plane[w, MIDDLE_Z])
+        t_y = slope + frame_turn
+        cx -= (patch[FOOT_X_PER_YAW, k] + cy) * frame_turn
         # velocity of the wheel's material against that of the rail, along the rail and across it
         rail_y, rail_z = (
             work.rail_motion[w, side, MOTION_Y_RATE],
@@ -98,15 +98,15 @@ def creepages(system, work, n, speed, state):
             - sine * rail_y
             - cosine * rail_z
         )
-        rolling = speed * (1.0 + w2 * (z + cz) - w3 * (y + cy)) + state[v]
+        v_p = speed * (1.0 + w2 * (z + cz) - w3 * (y + cy)) + state[v]
         patch[C_X, k] = cx
         patch[C_Y, k] = cy
         patch[C_Z, k] = cz
-        patch[TURN_Y, k] = turn_y
-        patch[TURN_Z, k] = turn_z
+        patch[TANGENT_Y, k] = t_y
+        patch[TANGENT_Z, k] = t_z
         patch[NORMAL_Y, k] = s
         patch[NORMAL_Z, k] = c
-        patch[PATCH_SPEED, k] = rolling
-        patch[XI_X, k] = (vx + turn_y * vy + turn_z * vz) / rolling
-        patch[XI_Y, k] = ((vy - turn_y * vx) * c - (vz - turn_z * vx) * s) / rolling
-        patch[PHI, k] = (a2 * s + a3 * c - a1 * (turn_y * s + turn_z * c)) / rolling
+        patch[PATCH_SPEED, k] = v_p
+        patch[XI_X, k] = (vx + t_y * vy + t_z * vz) / v_p
+        patch[XI_Y, k] = ((vy - t_y * vx) * c - (vz - t_z * vx) * s) / v_p
+        patch[PHI, k] = (a2 * s + a3 * c - a1 * (t_y * s + t_z * c)) / v_p

@@ -20,9 +20,9 @@ from railsim.kernels.system import (
 from railsim.kernels.track_frame import OMEGA, OMEGA_S
 
 # speed of the wheel's circumference below which a brake's torque decreases linearly to 0 (m/s)
-BRAKES_FULLY = 0.1
+FULL_BRAKE_SPEED = 0.1
 # that speed over the vehicle's, at most: no wheel that rolls loses its brake before the standstill
-OF_ROLLING = 0.5
+ROLLING_SHARE = 0.5
 
 
 @compiled(python=False)
@@ -55,7 +55,7 @@ def add_traction(system, work, speed):
 @compiled(python=False)
 def braking_share(rim, speed):
     """Share of a brake's torque against a tread that turns with `rim` [m/s], in its sense."""
-    return min(1.0, max(-1.0, rim / min(BRAKES_FULLY, OF_ROLLING * speed)))
+    return min(1.0, max(-1.0, rim / min(FULL_BRAKE_SPEED, ROLLING_SHARE * speed)))
 
 
 @compiled(python=False)
@@ -67,8 +67,8 @@ def axle_torque(drives, e, frame_offset, bodies, state):
     torque, _ = table_value_slope(drives.table[first:demand], speed)
     if end > demand:
         over_distance = drives.row[e, OVER_DISTANCE] > 0.0
-        at = s + frame_offset[bodies.frame[w]] if over_distance else time
-        factor, _ = table_value_slope(drives.table[demand:end], at)
+        x = s + frame_offset[bodies.frame[w]] if over_distance else time
+        factor, _ = table_value_slope(drives.table[demand:end], x)
         torque *= factor
     # forwards it turns about the negative y axis
     rolling = -state[velocity_begin(bodies.kind.shape[0]) + 6 * w + 4] * bodies.row[w, RADIUS]
@@ -77,9 +77,9 @@ def axle_torque(drives, e, frame_offset, bodies, state):
     if torque < 0.0:
         torque *= braking_share(rolling, speed)
     if drives.row[e, SLIP_END] > 0.0:
-        begin, gone = drives.row[e, SLIP_BEGIN], drives.row[e, SLIP_END]
+        slip_begin, slip_end = drives.row[e, SLIP_BEGIN], drives.row[e, SLIP_END]
         slip = (rolling - speed) / speed if torque > 0.0 else (speed - rolling) / speed
-        torque *= min(1.0, max(0.0, (gone - slip) / (gone - begin)))
+        torque *= min(1.0, max(0.0, (slip_end - slip) / (slip_end - slip_begin)))
     return torque
 
 
@@ -97,7 +97,7 @@ def add_axle_torques(system, work, state):
 
 
 @compiled(in_loop=False)
-def recorded_axle_torques(drives, frame_offset, bodies, states, torque):
+def write_axle_torques(drives, frame_offset, bodies, states, torque):
     """Torques of drives and brakes in recorded states, summed over those of a wheelset.
 
     Parameters
@@ -156,11 +156,11 @@ def apply_speed_change(system, work, state, rate, derivative):
 def hold_reference(bodies, work, derivative):
     """Keep the reference body's x; the force that holds it is part of its acceleration."""
     b = bodies.reference
-    held = velocity_begin(bodies.kind.shape[0]) + 6 * b
+    index = velocity_begin(bodies.kind.shape[0]) + 6 * b
     for i in range(3):
-        work.acceleration[b, i] -= derivative[held] * work.relative[b, i]
+        work.acceleration[b, i] -= derivative[index] * work.relative[b, i]
     derivative[6 * b] = 0.0
-    derivative[held] = 0.0
+    derivative[index] = 0.0
 
 
 @compiled(python=False)

@@ -6,7 +6,7 @@ The tables of names fix the order; `link_columns` and `mount_columns` read them 
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.lanes import load_rows, starts
+from railsim.kernels.lanes import load_rows, row_starts
 
 
 def _slices(columns: dict[str, int]) -> dict[str, slice]:
@@ -53,21 +53,21 @@ ONE_SIDED = 2  # in the column FRICTION: spring and damper along z press and nev
 
 
 @compiled(inline=True)
-def link_columns(row, which):
+def link_columns(row, lanes):
     """Points, then nominal length, stiffness, damping and preload of eight links."""
-    offsets = starts(which, LINK_SIZE)
+    offsets = row_starts(lanes, LINK_SIZE)
     x1, y1, z1, x2, y2, z2, length, stiffness = load_rows(row, offsets, 0, 8)
     damping, preload = load_rows(row, offsets, 8, 2)
     return (x1, y1, z1), (x2, y2, z2), (length, stiffness, damping, preload)
 
 
 @compiled(inline=True)
-def mount_columns(row, which):
+def mount_columns(row, lanes):
     """Points, shares, then stiffness, damping and preload, then those of rotation, of eight mounts.
 
     Each in the order of `MOUNT_COLUMNS`.
     """
-    offsets = starts(which, MOUNT_SIZE)
+    offsets = row_starts(lanes, MOUNT_SIZE)
     x1, y1, z1, x2, y2, z2, share_1, share_2 = load_rows(row, offsets, 0, 8)
     kx, ky, kz, cx, cy, cz, fx, fy = load_rows(row, offsets, 8, 8)
     fz, k1, k2, k3, c1, c2, c3 = load_rows(row, offsets, 16, 7)
@@ -80,17 +80,17 @@ def mount_columns(row, which):
     )
 
 
-def mount_laws(internal: np.ndarray, curve: np.ndarray, flags: np.ndarray) -> np.ndarray:
+def nonlinear_axes(internal: np.ndarray, curve: np.ndarray, flags: np.ndarray) -> np.ndarray:
     """Mount, axis, internal state of all that is more than spring and damper, rising.
 
     The state is -1 where there is none, or something else beside it.
     """
-    other = curve >= 0
-    other[:, 2] |= flags[:, FRICTION] == ONE_SIDED
-    has_law = other | (internal >= 0)
-    return np.stack([*np.nonzero(has_law), np.where(other, -1, internal)[has_law]], axis=1)
+    nonlinear = curve >= 0
+    nonlinear[:, 2] |= flags[:, FRICTION] == ONE_SIDED
+    has_law = nonlinear | (internal >= 0)
+    return np.stack([*np.nonzero(has_law), np.where(nonlinear, -1, internal)[has_law]], axis=1)
 
 
-def falling_friction(friction: np.ndarray) -> np.ndarray:
+def stribeck_mounts(friction: np.ndarray) -> np.ndarray:
     """Mounts whose friction falls with the sliding speed."""
     return np.flatnonzero((friction[:, :, 2] < 1.0).any(axis=1))

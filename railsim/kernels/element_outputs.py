@@ -7,15 +7,15 @@ stands in all eight lanes, and the first one is read.
 from railsim.kernels import compiled
 from railsim.kernels.element_columns import TRANSLATES, link_columns, mount_columns
 from railsim.kernels.elements import (
-    end_of,
-    in_axes_of,
-    link_law,
-    other_laws,
+    in_body_axes,
+    link_tension,
+    nonlinear_force,
+    pose_rows,
     relative_motion,
-    rotation_law,
+    rotation_moment,
     spring_damper,
 )
-from railsim.kernels.lanes import LANES, eight_from, store_lanes
+from railsim.kernels.lanes import LANES, lane_numbers, store_lanes
 from railsim.kernels.vectors import dot, plus, rotate, rotate_back, times
 
 LINK, MOUNT = range(2)
@@ -27,15 +27,15 @@ ELEMENT_COLUMNS = 20
 
 
 @compiled(python=False)
-def element_outputs(system, work, inner, chosen, out):
-    """Outputs of the elements ``chosen[e] = (group, index)`` into ``out[e, ELEMENT_COLUMNS]``."""
-    for e in range(chosen.shape[0]):
+def write_element_outputs(system, work, internals, selection, out):
+    """Outputs of the elements ``selection[e] = (group, index)`` into ``out[e, :]``."""
+    for e in range(selection.shape[0]):
         for k in range(ELEMENT_COLUMNS):
             out[e, k] = 0.0
-        if chosen[e, 0] == LINK:
-            link_output(system, work, inner, chosen[e, 1], e, out)
-        elif chosen[e, 0] == MOUNT:
-            mount_output(system, work, inner, chosen[e, 1], e, out)
+        if selection[e, 0] == LINK:
+            write_link_output(system, work, internals, selection[e, 1], e, out)
+        elif selection[e, 0] == MOUNT:
+            write_mount_output(system, work, internals, selection[e, 1], e, out)
 
 
 @compiled(inline=True)
@@ -46,21 +46,21 @@ def first_lane(laws, x):
 
 
 @compiled(inline=True)
-def put(out, e, column, laws, v):
+def store_vector(out, e, column, laws, v):
     """Store the first lanes of a vector."""
     for k in range(3):
         out[e, column + k] = first_lane(laws, v[k])
 
 
 @compiled(python=False)
-def link_output(system, work, inner, index, e, out):
+def write_link_output(system, work, internals, index, e, out):
     """Elongation, force (tension positive) and power of a link."""
     links, laws = system.links, work.laws
-    which = eight_from(index, index + 1)
-    one, two = end_of(links.body, 0, which), end_of(links.body, 1, which)
-    point_1, point_2, law = link_columns(links.row, which)
-    _, _, _, _, _, _, g, w = relative_motion(work.pose, one, two, point_1, point_2)
-    _, tension = link_law(system, work, index, 1, (g, w, law), inner)
+    lanes = lane_numbers(index, index + 1)
+    b1, b2 = pose_rows(links.body, 0, lanes), pose_rows(links.body, 1, lanes)
+    point_1, point_2, law = link_columns(links.row, lanes)
+    _, _, _, _, _, _, g, w = relative_motion(work.pose, b1, b2, point_1, point_2)
+    _, tension = link_tension(system, work, index, 1, (g, w, law), internals)
     elongation, rate = laws[0], laws[LANES]
     force = first_lane(laws, tension)
     out[e, DEFLECTION] = elongation
@@ -70,28 +70,28 @@ def link_output(system, work, inner, index, e, out):
 
 
 @compiled(python=False)
-def mount_output(system, work, inner, index, e, out):
+def write_mount_output(system, work, internals, index, e, out):
     """Deflections, angles, forces, moments (on body 1, its axes) and power of a mount."""
     mounts, laws = system.mounts, work.laws
-    which = eight_from(index, index + 1)
-    one, two = end_of(mounts.body, 0, which), end_of(mounts.body, 1, which)
-    point_1, point_2, share, spring, rotation = mount_columns(mounts.row, which)
-    R1, R2, omega_1, omega_2, _, _, g, w = relative_motion(work.pose, one, two, point_1, point_2)
+    lanes = lane_numbers(index, index + 1)
+    b1, b2 = pose_rows(mounts.body, 0, lanes), pose_rows(mounts.body, 1, lanes)
+    point_1, point_2, share, spring, rotation = mount_columns(mounts.row, lanes)
+    R1, R2, omega_1, omega_2, _, _, g, w = relative_motion(work.pose, b1, b2, point_1, point_2)
     if mounts.flags[index, TRANSLATES]:
-        d, rate = in_axes_of(R1, omega_1, g, w)
+        d, rate = in_body_axes(R1, omega_1, g, w)
         law = 0
         while law < mounts.law.shape[0] and mounts.law[law, 0] < index:
             law += 1
-        more, _ = other_laws(system, work, (index, law, index + 1), d, rate, inner)
-        force = times(share[0], plus(spring_damper(spring, d, rate), more))
-        d_2, rate_2 = in_axes_of(R2, omega_2, g, w)
+        nonlinear, _ = nonlinear_force(system, work, (index, law, index + 1), d, rate, internals)
+        force = times(share[0], plus(spring_damper(spring, d, rate), nonlinear))
+        d_2, rate_2 = in_body_axes(R2, omega_2, g, w)
         force_2 = times(share[1], spring_damper(spring, d_2, rate_2))  # of a shear spring half
-        put(out, e, DEFLECTION, laws, d)
-        put(out, e, FORCE, laws, plus(force, rotate_back(R1, rotate(R2, force_2))))
-        put(out, e, RATE, laws, rate)
+        store_vector(out, e, DEFLECTION, laws, d)
+        store_vector(out, e, FORCE, laws, plus(force, rotate_back(R1, rotate(R2, force_2))))
+        store_vector(out, e, RATE, laws, rate)
         out[e, POWER] += first_lane(laws, dot(force, rate) + dot(force_2, rate_2))
-    angle, rate, moment = rotation_law(R1, R2, omega_1, omega_2, rotation)
-    put(out, e, ANGLE, laws, angle)
-    put(out, e, MOMENT, laws, moment)
-    put(out, e, RATE + 3, laws, rate)
+    angle, rate, moment = rotation_moment(R1, R2, omega_1, omega_2, rotation)
+    store_vector(out, e, ANGLE, laws, angle)
+    store_vector(out, e, MOMENT, laws, moment)
+    store_vector(out, e, RATE + 3, laws, rate)
     out[e, POWER] += first_lane(laws, dot(moment, rate))

@@ -19,7 +19,7 @@ states (see `internal`).
 from math import exp, sqrt
 
 from railsim.kernels import compiled
-from railsim.kernels.branches import rarely
+from railsim.kernels.branches import unlikely
 from railsim.kernels.element_columns import (
     BOTH_ENDS,
     DAMPING_Z,
@@ -35,15 +35,15 @@ from railsim.kernels.internal import AIR, PAD, curve_value
 from railsim.kernels.lanes import (
     LANES,
     add_to_pairs,
-    eight_from,
+    lane_numbers,
     load_lanes,
     load_rows,
-    spread,
+    row_starts,
+    splat,
     square_root,
-    starts,
     store_lanes,
 )
-from railsim.kernels.system import FORCE, MOMENT, POSE_SIZE, PUSH
+from railsim.kernels.system import FORCE, FORCE_LINE, MOMENT, POSE_SIZE
 from railsim.kernels.track_frame import ATTITUDE
 from railsim.kernels.vectors import (
     add_at,
@@ -62,15 +62,15 @@ from railsim.kernels.vectors import (
 
 
 @compiled(inline=True)
-def end_of(body, end, which):
+def pose_rows(body, end, lanes):
     """Where the rows in `Work.pose` of one end's bodies start, for eight elements."""
-    a, b, c, d = body[which[0], end], body[which[1], end], body[which[2], end], body[which[3], end]
-    e, f, g, h = body[which[4], end], body[which[5], end], body[which[6], end], body[which[7], end]
-    return starts((a, b, c, d, e, f, g, h), POSE_SIZE)
+    a, b, c, d = body[lanes[0], end], body[lanes[1], end], body[lanes[2], end], body[lanes[3], end]
+    e, f, g, h = body[lanes[4], end], body[lanes[5], end], body[lanes[6], end], body[lanes[7], end]
+    return row_starts((a, b, c, d, e, f, g, h), POSE_SIZE)
 
 
 @compiled(inline=True)
-def motion_of(pose, rows):
+def body_motion(pose, rows):
     """Attitude, position, velocity and angular velocity of eight bodies."""
     r0, r1, r2, r3, r4, r5, r6, r7 = load_rows(pose, rows, 0, 8)
     r8, x, y, z, vx, vy, vz, w1 = load_rows(pose, rows, 8, 8)
@@ -79,7 +79,7 @@ def motion_of(pose, rows):
 
 
 @compiled(inline=True)
-def relative_motion(pose, one, two, point_1, point_2):
+def relative_motion(pose, b1, b2, point_1, point_2):
     """Motion of points of body 2 against points of body 1, in global axes.
 
     Returns
@@ -88,8 +88,8 @@ def relative_motion(pose, one, two, point_1, point_2):
     a, b : arms from the centres of gravity to the points
     g, w : vector from point 1 to point 2, and its rate
     """
-    R1, X1, V1, omega_1 = motion_of(pose, one)
-    R2, X2, V2, omega_2 = motion_of(pose, two)
+    R1, X1, V1, omega_1 = body_motion(pose, b1)
+    R2, X2, V2, omega_2 = body_motion(pose, b2)
     a, b = rotate(R1, point_1), rotate(R2, point_2)
     g = minus(plus(minus(X2, X1), b), a)
     w = minus(minus(plus(V2, cross(omega_2, b)), V1), cross(omega_1, a))
@@ -97,39 +97,39 @@ def relative_motion(pose, one, two, point_1, point_2):
 
 
 @compiled(inline=True)
-def push(pose, one, two, force, moment_1, moment_2, n):
-    """Add a force and a moment to `n` bodies `one`, the opposite force and a moment to `two`."""
-    zero = spread(0.0)
+def add_force_pair(pose, b1, b2, force, moment_1, moment_2, n):
+    """Add a force and a moment to `n` bodies `b1`, the opposite force and a moment to `b2`."""
+    zero = splat(0.0)
     fx, fy, fz = force
     m1, m2, m3 = moment_1
     n1, n2, n3 = moment_2
-    to_one = (zero, zero, fx, fy, fz, m1, m2, m3)
-    add_to_pairs(pose, one, two, PUSH, to_one, (zero, zero, -fx, -fy, -fz, n1, n2, n3), n)
+    on_1 = (zero, zero, fx, fy, fz, m1, m2, m3)
+    add_to_pairs(pose, b1, b2, FORCE_LINE, on_1, (zero, zero, -fx, -fy, -fz, n1, n2, n3), n)
 
 
 # Entries of `Work.laws` after those of the elements at hand: the time for which forces of tables
-# and pads without tension are foreseen [s], and the largest rate at which one will change [N/s].
-AHEAD, RATE_OF_STOPS = 9 * LANES, 9 * LANES + 1
+# and pads without tension are predicted [s], and the largest rate at which one will change [N/s].
+HORIZON, STOP_RATE = 9 * LANES, 9 * LANES + 1
 LAWS_SIZE = 10 * LANES
 
 
 @compiled(python=False)
-def note_stop(laws, force, next_force):
-    """Note how fast the force of a stop changes from `force` to `next_force`."""
-    laws[RATE_OF_STOPS] = max(laws[RATE_OF_STOPS], abs(next_force - force) / laws[AHEAD])
+def update_stop_rate(laws, force, next_force):
+    """Update the largest rate of stops by a change from `force` to `next_force`."""
+    laws[STOP_RATE] = max(laws[STOP_RATE], abs(next_force - force) / laws[HORIZON])
 
 
 @compiled(python=False)
-def spring_table(curves, index, d, rate, laws):
+def table_force(curves, index, d, rate, laws):
     """Force of a table at the deflection `d`; steps in which it changes fast are divided."""
     force = curve_value(curves, index, d)
-    if laws[AHEAD] > 0.0:
-        note_stop(laws, force, curve_value(curves, index, d + laws[AHEAD] * rate))
+    if laws[HORIZON] > 0.0:
+        update_stop_rate(laws, force, curve_value(curves, index, d + laws[HORIZON] * rate))
     return force
 
 
 @compiled(python=False)
-def link_laws(system, work, first, n, inner):
+def set_link_laws(system, work, first, n, internals):
     """Forces of internal states and tables of `n` links; `laws`: elongations, rates, forces."""
     links, curves, drive, laws = system.links, system.curves, work.drive, work.laws
     for k in range(n):
@@ -138,17 +138,17 @@ def link_laws(system, work, first, n, inner):
         force = 0.0
         m = links.internal[e]
         if m >= 0:
-            force += inner[m]
+            force += internals[m]
             drive[m, 0] = rate
-        if rarely(links.curve[e, 0] >= 0):
-            force += spring_table(curves, links.curve[e, 0], laws[k], rate, laws)
-        if rarely(links.curve[e, 1] >= 0):
+        if unlikely(links.curve[e, 0] >= 0):
+            force += table_force(curves, links.curve[e, 0], laws[k], rate, laws)
+        if unlikely(links.curve[e, 1] >= 0):
             force += curve_value(curves, links.curve[e, 1], rate)
         laws[2 * LANES + k] = force
 
 
 @compiled(inline=True)
-def link_law(system, work, first, n, motion, inner):
+def link_tension(system, work, first, n, motion, internals):
     """Direction and tension of `n` links, in lanes; `laws` keeps their elongations and rates.
 
     ``motion``: see `relative_motion`, and the link's columns.
@@ -161,39 +161,39 @@ def link_law(system, work, first, n, motion, inner):
     laws = work.laws
     store_lanes(laws, 0, elongation)
     store_lanes(laws, LANES, rate)
-    link_laws(system, work, first, n, inner)
+    set_link_laws(system, work, first, n, internals)
     force = preload + stiffness * elongation + damping * rate + load_lanes(laws, 2 * LANES)
     return direction, force
 
 
 @compiled(python=False)
-def link_forces(system, work, inner):
+def add_link_forces(system, work, internals):
     """Add the forces of all point-to-point elements to the bodies' rows in `pose`.
 
-    inner : float64[m]
+    internals : float64[m]
         Internal states of elements.
     """
     links, pose = system.links, work.pose
     count = links.body.shape[0]
     for first in range(0, count, LANES):
         n = min(count - first, LANES)
-        which = eight_from(first, count)
-        one, two = end_of(links.body, 0, which), end_of(links.body, 1, which)
-        point_1, point_2, law = link_columns(links.row, which)
-        _, _, _, _, a, b, g, w = relative_motion(pose, one, two, point_1, point_2)
-        direction, force = link_law(system, work, first, n, (g, w, law), inner)
+        lanes = lane_numbers(first, count)
+        b1, b2 = pose_rows(links.body, 0, lanes), pose_rows(links.body, 1, lanes)
+        point_1, point_2, law = link_columns(links.row, lanes)
+        _, _, _, _, a, b, g, w = relative_motion(pose, b1, b2, point_1, point_2)
+        direction, force = link_tension(system, work, first, n, (g, w, law), internals)
         f = times(force, direction)
-        push(pose, one, two, f, cross(a, f), negative(cross(b, f)), n)
+        add_force_pair(pose, b1, b2, f, cross(a, f), negative(cross(b, f)), n)
 
 
 @compiled(inline=True)
-def limit_of(friction, e, k, normal):
+def friction_limit(friction, e, k, normal):
     """Largest friction force of mount `e` along axis `k` under the load `normal`."""
     return friction[e, k, 0] + friction[e, k, 1] * normal
 
 
 @compiled(python=False)
-def grip(system, friction, e, normal, inner):
+def friction_reduction(system, friction, e, normal, internals):
     """Factor that reduces the friction forces of a pad that slides in any direction to its limit.
 
     With q the forces over their limits, |q| - e q_z <= 1; e = mu/tan(angle) of a wedge, else 0.  A
@@ -206,8 +206,8 @@ def grip(system, friction, e, normal, inner):
     for k in range(3):
         m = mounts.internal[e, k]
         if m >= 0:
-            limit = limit_of(friction, e, k, normal)
-            z = inner[m] / limit if limit > 0.0 else 0.0
+            limit = friction_limit(friction, e, k, normal)
+            z = internals[m] / limit if limit > 0.0 else 0.0
             square += z * z
             skew = internal.parameter[m, 2]
     size = sqrt(square) - skew * z
@@ -215,7 +215,7 @@ def grip(system, friction, e, normal, inner):
 
 
 @compiled(python=False)
-def axis_law(system, work, e, k, motion, inner):
+def axis_force(system, work, e, k, motion, internals):
     """Force along axis `k` of mount `e` of its table and internal state.
 
     ``motion``: deflection, its rate, and the load on a pad.
@@ -225,26 +225,26 @@ def axis_law(system, work, e, k, motion, inner):
     d, rate, normal = motion
     force = 0.0
     if mounts.curve[e, k] >= 0:
-        force += spring_table(curves, mounts.curve[e, k], d, rate, laws)
+        force += table_force(curves, mounts.curve[e, k], d, rate, laws)
     m = mounts.internal[e, k]
     if m >= 0:
         if internal.kind[m] == PAD:
-            limit = limit_of(friction, e, k, normal)
+            limit = friction_limit(friction, e, k, normal)
             drive[m, 0], drive[m, 1] = rate, limit
             if internal.parameter[m, 1] == 0.0:
-                force += min(limit, max(-limit, inner[m]))
+                force += min(limit, max(-limit, internals[m]))
             elif limit > 0.0:
-                force += inner[m] * grip(system, friction, e, normal, inner)
+                force += internals[m] * friction_reduction(system, friction, e, normal, internals)
         elif internal.kind[m] == AIR:
             drive[m, 0] = d
-            force += internal.parameter[m, 0] * (d - inner[m])
+            force += internal.parameter[m, 0] * (d - internals[m])
         else:
             drive[m, 0] = rate
-            force += inner[m]
-    if rarely(k == 2 and mounts.flags[e, FRICTION] == ONE_SIDED):
-        force += lifted_part(mounts, e, d, rate, normal)
-        if laws[AHEAD] > 0.0:
-            note_stop(laws, normal, pad_load(mounts, curves, e, d + laws[AHEAD] * rate))
+            force += internals[m]
+    if unlikely(k == 2 and mounts.flags[e, FRICTION] == ONE_SIDED):
+        force += lift_off_force(mounts, e, d, rate, normal)
+        if laws[HORIZON] > 0.0:
+            update_stop_rate(laws, normal, pad_load(mounts, curves, e, d + laws[HORIZON] * rate))
     return force
 
 
@@ -269,7 +269,7 @@ def pad_load(mounts, curves, e, z):
 
 
 @compiled(inline=True)
-def lifted_part(mounts, e, z, rate, normal):
+def lift_off_force(mounts, e, z, rate, normal):
     """Force that cancels the tension of spring and damper of a pad that only presses."""
     spring = mounts.row[e, PRELOAD_Z] + mounts.row[e, STIFFNESS_Z] * z
     damper = mounts.row[e, DAMPING_Z] * rate
@@ -279,7 +279,7 @@ def lifted_part(mounts, e, z, rate, normal):
 
 
 @compiled(python=False)
-def mount_laws(system, work, block, inner):
+def set_mount_laws(system, work, block, internals):
     """Forces of internal states and tables of mounts; `laws`: deflections, rates, forces.
 
     ``block``: first mount, first of `Mounts.law` and the mount after the last one.  Returns the
@@ -294,15 +294,15 @@ def mount_laws(system, work, block, inner):
         d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
         if m >= 0 and internal.kind[m] != PAD and internal.kind[m] != AIR:
             work.drive[m, 0] = rate
-            laws[(6 + k) * LANES + lane] = inner[m]
+            laws[(6 + k) * LANES + lane] = internals[m]
             continue
         normal = pad_load(mounts, system.curves, e, laws[2 * LANES + lane])
-        laws[(6 + k) * LANES + lane] = axis_law(system, work, e, k, (d, rate, normal), inner)
+        laws[(6 + k) * LANES + lane] = axis_force(system, work, e, k, (d, rate, normal), internals)
     return law
 
 
 @compiled(inline=True)
-def in_axes_of(R, omega, g, w):
+def in_body_axes(R, omega, g, w):
     """Deflection R^T g in a body's axes, and its rate R^T (w - omega x g)."""
     return rotate_back(R, g), rotate_back(R, minus(w, cross(omega, g)))
 
@@ -315,21 +315,21 @@ def spring_damper(law, d, rate):
 
 
 @compiled(inline=True)
-def other_laws(system, work, block, d, rate, inner):
-    """Forces of internal states and tables of a block of mounts, and what `mount_laws` returns."""
+def nonlinear_force(system, work, block, d, rate, internals):
+    """Forces of states and tables of a block of mounts, and what `set_mount_laws` returns."""
     laws = work.laws
-    zero = spread(0.0)
+    zero = splat(0.0)
     for k in range(3):
         store_lanes(laws, k * LANES, d[k])
         store_lanes(laws, (3 + k) * LANES, rate[k])
         store_lanes(laws, (6 + k) * LANES, zero)
-    law = mount_laws(system, work, block, inner)
+    law = set_mount_laws(system, work, block, internals)
     forces = load_lanes(laws, 6 * LANES), load_lanes(laws, 7 * LANES), load_lanes(laws, 8 * LANES)
     return forces, law
 
 
 @compiled(inline=True)
-def rotation_law(R1, R2, omega_1, omega_2, law):
+def rotation_moment(R1, R2, omega_1, omega_2, law):
     """Angles, their rates and the moment on body 1 in its axes; tr(K_d (1 - R_1^T R_2)), damping.
 
     The angles are the antisymmetric part of R_1^T R_2.
@@ -349,7 +349,7 @@ def rotation_law(R1, R2, omega_1, omega_2, law):
 
 
 @compiled(python=False)
-def friction_at_speed(system, work):
+def update_friction_limits(system, work):
     """Limits of pads with friction that falls: r + (1 - r) exp(-|v|/v_s) of those at rest.
 
     v is the rate of the deflection, of a pad that slides in any direction that along all its axes
@@ -360,11 +360,11 @@ def friction_at_speed(system, work):
     laws, pose, friction = work.laws, work.pose, work.friction
     for i in range(mounts.falling.shape[0]):
         e = mounts.falling[i]
-        which = eight_from(e, e + 1)
-        one, two = end_of(mounts.body, 0, which), end_of(mounts.body, 1, which)
-        point_1, point_2, _, _, _ = mount_columns(mounts.row, which)
-        R1, _, omega_1, _, _, _, g, w = relative_motion(pose, one, two, point_1, point_2)
-        _, rate = in_axes_of(R1, omega_1, g, w)
+        lanes = lane_numbers(e, e + 1)
+        b1, b2 = pose_rows(mounts.body, 0, lanes), pose_rows(mounts.body, 1, lanes)
+        point_1, point_2, _, _, _ = mount_columns(mounts.row, lanes)
+        R1, _, omega_1, _, _, _, g, w = relative_motion(pose, b1, b2, point_1, point_2)
+        _, rate = in_body_axes(R1, omega_1, g, w)
         for k in range(3):
             store_lanes(laws, k * LANES, rate[k])
         for k in range(3):
@@ -381,78 +381,78 @@ def friction_at_speed(system, work):
 
 
 @compiled(python=False)
-def mount_forces(system, work, inner):
+def add_mount_forces(system, work, internals):
     """Add the forces of all three-axis elements to the bodies' rows in `pose`.
 
     The force acts in the axes of body 1, of a shear spring half of it in those of body 2.  The
     gradient of the potential puts the moment g x f on the body whose axes they are, besides the
-    forces +-f at the points.  ``inner``: internal states.
+    forces +-f at the points.  ``internals``: internal states.
     """
     mounts, pose = system.mounts, work.pose
     count = mounts.body.shape[0]
     law = 0
     for first in range(0, count, LANES):
         n = min(count - first, LANES)
-        which = eight_from(first, count)
+        lanes = lane_numbers(first, count)
         both_ends, rotates = 0, 0
         for e in range(first, first + n):
             both_ends |= mounts.flags[e, BOTH_ENDS]
             rotates |= mounts.flags[e, ROTATES]
-        one, two = end_of(mounts.body, 0, which), end_of(mounts.body, 1, which)
-        point_1, point_2, share, spring, rotation = mount_columns(mounts.row, which)
-        R1, R2, omega_1, omega_2, a, b, g, w = relative_motion(pose, one, two, point_1, point_2)
-        d, rate = in_axes_of(R1, omega_1, g, w)
+        b1, b2 = pose_rows(mounts.body, 0, lanes), pose_rows(mounts.body, 1, lanes)
+        point_1, point_2, share, spring, rotation = mount_columns(mounts.row, lanes)
+        R1, R2, omega_1, omega_2, a, b, g, w = relative_motion(pose, b1, b2, point_1, point_2)
+        d, rate = in_body_axes(R1, omega_1, g, w)
         t = spring_damper(spring, d, rate)
         if law < mounts.law.shape[0] and mounts.law[law, 0] < first + n:
-            forces, law = other_laws(system, work, (first, law, first + n), d, rate, inner)
+            forces, law = nonlinear_force(system, work, (first, law, first + n), d, rate, internals)
             t = plus(t, forces)
         f = rotate(R1, times(share[0], t))
         moment_1 = cross(g, f)
-        moment_2 = spread(0.0), spread(0.0), spread(0.0)
+        moment_2 = splat(0.0), splat(0.0), splat(0.0)
         if both_ends:
-            d, rate = in_axes_of(R2, omega_2, g, w)
+            d, rate = in_body_axes(R2, omega_2, g, w)
             f_2 = rotate(R2, times(share[1], spring_damper(spring, d, rate)))
             moment_2 = cross(g, f_2)
             f = plus(f, f_2)
         if rotates:
-            _, _, m = rotation_law(R1, R2, omega_1, omega_2, rotation)
+            _, _, m = rotation_moment(R1, R2, omega_1, omega_2, rotation)
             m = rotate(R1, m)
             moment_1, moment_2 = plus(moment_1, m), minus(moment_2, m)
         moment_1, moment_2 = plus(moment_1, cross(a, f)), minus(moment_2, cross(b, f))
-        push(pose, one, two, f, moment_1, moment_2, n)
+        add_force_pair(pose, b1, b2, f, moment_1, moment_2, n)
 
 
 @compiled(python=False)
-def load_component(table, first, last, at, k):
-    """Component `k` of a load at `at`: linear between its rows, constant beyond them."""
-    if at <= table[first, 0]:
+def load_component(table, first, last, x, k):
+    """Component `k` of a load at `x`: linear between its rows, constant beyond them."""
+    if x <= table[first, 0]:
         return table[first, k]
     i = first
-    while i < last - 1 and at > table[i + 1, 0]:
+    while i < last - 1 and x > table[i + 1, 0]:
         i += 1
     if i == last - 1:
         return table[i, k]
-    share = (at - table[i, 0]) / (table[i + 1, 0] - table[i, 0])
+    share = (x - table[i, 0]) / (table[i + 1, 0] - table[i, 0])
     return table[i, k] + share * (table[i + 1, k] - table[i, k])
 
 
 @compiled(python=False)
-def load_forces(system, work, time, s):
+def add_load_forces(system, work, time, s):
     """Add the given forces and torques at `time` and `s` to the bodies' rows in `pose`."""
     loads, pose = system.loads, work.pose
     for e in range(loads.body.shape[0]):
         b = loads.body[e]
         first, last = loads.start[e], loads.start[e + 1]
         f = system.bodies.frame[b]
-        at = s + system.frame_offset[f] if loads.flags[e, 2] else time
-        given = (
-            load_component(loads.table, first, last, at, 1),
-            load_component(loads.table, first, last, at, 2),
-            load_component(loads.table, first, last, at, 3),
+        x = s + system.frame_offset[f] if loads.flags[e, 2] else time
+        components = (
+            load_component(loads.table, first, last, x, 1),
+            load_component(loads.table, first, last, x, 2),
+            load_component(loads.table, first, last, x, 3),
         )
         R = matrix_at(pose, b, 0)
         axes = matrix_at(work.frames, f, ATTITUDE) if loads.flags[e, 1] else R
-        v = rotate(axes, given)
+        v = rotate(axes, components)
         if loads.flags[e, 0]:
             add_at(pose, b, MOMENT, v)
             continue

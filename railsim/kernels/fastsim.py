@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import compiled, fastsim_simd
-from .aligned import aligned_zeros
+from .alignment import aligned_zeros
 from .fastsim_simd import BOUNDS, PER_L, RESULTS, W_ACROSS, W_ALONG, W_SUM, Y_PER_L
-from .lanes import LANES, larger, load_few, smaller, spread, square_root, store_lanes, where_beyond
+from .lanes import LANES, load_part, maximum, minimum, splat, square_root, store_lanes, where_beyond
 
 KALKER_U_MAX = 0.92  # the coefficient table covers |a - b| <= 0.92 (a + b): 1/24 <= a/b <= 24
 WORK_ROWS = 16
@@ -66,7 +66,7 @@ def fastsim_workspace(n_patch: int, ny: int, nx: int) -> NDArray[np.float64]:
 
 
 @compiled(ordered=True)
-def kalker_lookup(n, patches, table):
+def look_up_kalker(n, patches, table):
     """Kalker's coefficients of n patches from the table of `railsim.contact.kalker.creep_tables`.
 
     Parameters
@@ -99,9 +99,9 @@ def kalker_lookup(n, patches, table):
 
 
 @compiled(inline=True)
-def size(x):
+def absolute(x):
     """|x|, lane by lane."""
-    return larger(x, -x)
+    return maximum(x, -x)
 
 
 @compiled(python=False)
@@ -112,22 +112,22 @@ def _patch_slopes(n, nx, patches, G, work):
     dx xi_x/(L1 p0), dx xi_y/(L2 p0), dx phi a/(L3 p0), dx phi b/(L3 p0).  Zero without contact or
     friction.
     """
-    per_cell, zero = math.pi * G / nx, spread(0.0)
+    per_cell, zero = math.pi * G / nx, splat(0.0)
     for i in range(0, n, LANES):
-        left = n - i
+        count = n - i
         # of a number that is none or negative and 0 the larger one is 0
-        a = larger(load_few(patches.a, i, left), zero)
-        b = larger(load_few(patches.b, i, left), zero)
-        mu_N = larger(load_few(patches.mu_N, i, left), zero)
-        unit = per_cell * a * b / where_beyond(mu_N, _NO_LOAD, mu_N, spread(1.0))
-        narrow = square_root(b / where_beyond(a, 0.0, a, spread(1.0)))
-        c23_phi = load_few(patches.c23, i, left) * load_few(patches.phi, i, left)
+        a = maximum(load_part(patches.a, i, count), zero)
+        b = maximum(load_part(patches.b, i, count), zero)
+        mu_N = maximum(load_part(patches.mu_N, i, count), zero)
+        unit = per_cell * a * b / where_beyond(mu_N, _NO_LOAD, mu_N, splat(1.0))
+        narrow = square_root(b / where_beyond(a, 0.0, a, splat(1.0)))
+        c23_phi = load_part(patches.c23, i, count) * load_part(patches.phi, i, count)
         spin = (4.0 / math.pi) * unit * c23_phi * narrow
-        x = 0.375 * unit * load_few(patches.c11, i, left) * load_few(patches.xi_x, i, left)
-        y = 0.375 * unit * load_few(patches.c22, i, left) * load_few(patches.xi_y, i, left)
+        x = 0.375 * unit * load_part(patches.c11, i, count) * load_part(patches.xi_x, i, count)
+        y = 0.375 * unit * load_part(patches.c22, i, count) * load_part(patches.xi_y, i, count)
         along, across = spin * a, spin * b
-        total = size(x) + size(y) + size(along) + size(across)
-        scale = smaller(spread(1.0), _GROWTH_MAX / (total + 1.0))
+        total = absolute(x) + absolute(y) + absolute(along) + absolute(across)
+        scale = minimum(splat(1.0), _GROWTH_MAX / (total + 1.0))
         scale = where_beyond(mu_N, _NO_LOAD, scale, zero)
         store_lanes(work[3], i, scale * x)
         store_lanes(work[4], i, scale * y)

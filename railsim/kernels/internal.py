@@ -16,7 +16,7 @@ PAD            force of a friction pad that sticks elastically and slides at a l
                greatest dissipation (Michalowski, Mroz 1978, Archives of Mechanics 30)
 LAG            command u behind a first-order lag, x' = (u - x)/tau within +-r; exact over a step at
                constant u
-OWN            state of a law of one's own, whose rate is its drive; the trapezoidal rule
+USER           state of a law of one's own, whose rate is its drive; the trapezoidal rule
 AIR            deflection w of the reservoir, c w' = k_1 (z - w) - k_2 w (Nishimura 1984); exact
                over a step at constant z
 """
@@ -29,10 +29,10 @@ import numpy as np
 from railsim.kernels import compiled
 from railsim.kernels.record import record
 
-MAXWELL, MAXWELL_CURVE, PAD, AIR, LAG, OWN = range(6)
-MOST_RETURNS = 8  # iterations of `hold_within`
-RETURNED = 1e-12  # what is left beyond the limit, over it
-LEAST_LIMIT = 1e-6  # N; below it there is no friction
+MAXWELL, MAXWELL_CURVE, PAD, AIR, LAG, USER = range(6)
+MAX_RETURNS = 8  # iterations of `return_to_limit`
+RETURN_TOLERANCE = 1e-12  # what is left beyond the limit, over it
+MIN_LIMIT = 1e-6  # N; below it there is no friction
 
 
 @record
@@ -93,7 +93,7 @@ def speed_on_branch(curves, i, f, flat):
 
 
 @compiled(python=False)
-def curve_advanced(curves, index, k_s, f, v, h):
+def curve_force_after(curves, index, k_s, f, v, h):
     """Force of a damper with the table `index` behind a spring `k_s` after a step at constant `v`.
 
     On each branch of slope c the force relaxes to that of the branch at `v` with tau = c/k_s; where
@@ -131,7 +131,7 @@ def curve_advanced(curves, index, k_s, f, v, h):
 
 
 @compiled(python=False)
-def within_table(curves, index, f):
+def limit_to_curve(curves, index, f):
     """`f`, but not beyond the end of a table that is flat there."""
     first = curves.start[index]
     last = curves.start[index + 1] - 1
@@ -165,7 +165,7 @@ def internal_rate(internal, curves, i, x, drive, limit):
     """Time derivative of state `i`."""
     if internal.kind[i] == PAD:
         rate = internal.parameter[i, 0] * drive
-        if internal.parameter[i, 1] > 0.0:  # `hold_within` brings it back
+        if internal.parameter[i, 1] > 0.0:  # `return_to_limit` brings it back
             return rate
         sliding = (x >= limit and rate > 0.0) or (x <= -limit and rate < 0.0)
         return 0.0 if sliding else rate
@@ -177,25 +177,25 @@ def internal_rate(internal, curves, i, x, drive, limit):
         return p[i, 1] * (drive - x / p[i, 0])
     if internal.kind[i] == LAG:
         return min(p[i, 1], max(-p[i, 1], (limit - x) / p[i, 0]))
-    if internal.kind[i] == OWN:
+    if internal.kind[i] == USER:
         return drive
     return (p[i, 0] * (drive - x) - p[i, 1] * x) / p[i, 2]
 
 
 @compiled(inline=True)
-def slides_together(internal, i):
+def ends_pad(internal, i):
     """Whether state `i` is the last of a pad that slides in any direction."""
     return internal.kind[i] == PAD and internal.parameter[i, 1] > 1.0
 
 
 @compiled(inline=True)
-def yielding(internal, i, drive):
+def return_rate(internal, i, drive):
     """k/L^2 of a friction pad's state `i`: how fast sliding takes its force back."""
     return internal.parameter[i, 0] / (drive[i, 1] * drive[i, 1])
 
 
 @compiled(python=False)
-def hold_within(internal, last, first, drive, state):
+def return_to_limit(internal, last, first, drive, state):
     """Bring the forces of a pad that slides in any direction back to their limit.
 
     They stand in `state` from `first` on; the limits in `drive`; `last` is the pad's last state.
@@ -210,20 +210,20 @@ def hold_within(internal, last, first, drive, state):
     """
     begin, skew = last + 1 - int(internal.parameter[last, 1]), internal.parameter[last, 2]
     size, slip = 0.0, 0.0
-    for _ in range(MOST_RETURNS):
+    for _ in range(MAX_RETURNS):
         square, change, z, z_change = 0.0, 0.0, 0.0, 0.0
         for i in range(begin, last + 1):
             z, z_change = 0.0, 0.0
-            if drive[i, 1] > LEAST_LIMIT:
-                back = yielding(internal, i, drive)
-                z = state[first + i] / (drive[i, 1] * (1.0 + slip * back))
-                z_change = -z * back / (1.0 + slip * back)
+            if drive[i, 1] > MIN_LIMIT:
+                rate = return_rate(internal, i, drive)
+                z = state[first + i] / (drive[i, 1] * (1.0 + slip * rate))
+                z_change = -z * rate / (1.0 + slip * rate)
             else:
                 state[first + i] = 0.0
             square += z * z
             change += z * z_change
         size = sqrt(square) - skew * z
-        if size <= 1.0 + RETURNED:
+        if size <= 1.0 + RETURN_TOLERANCE:
             break
         slope = change / sqrt(square) - skew * z_change
         if slope >= 0.0:  # a wedge that slides along its column alone does not come back
@@ -231,24 +231,24 @@ def hold_within(internal, last, first, drive, state):
         slip += size * (1.0 - size) / slope
     if slip > 0.0 or size > 1.0:
         for i in range(begin, last + 1):
-            if drive[i, 1] > LEAST_LIMIT:
-                state[first + i] /= (1.0 + slip * yielding(internal, i, drive)) * size
+            if drive[i, 1] > MIN_LIMIT:
+                state[first + i] /= (1.0 + slip * return_rate(internal, i, drive)) * size
 
 
 @compiled(python=False)
-def lag_advanced(tau, rate, x, command, h):
+def lag_after(tau, rate, x, command, h):
     """Command behind a first-order lag with a limited rate, after a step `h`."""
-    left = abs(command - x) - rate * tau
-    way = 1.0 if command > x else -1.0
-    if left > 0.0:
-        at_the_limit = min(h, left / rate)
-        x += way * rate * at_the_limit
-        h -= at_the_limit
+    excess = abs(command - x) - rate * tau
+    direction = 1.0 if command > x else -1.0
+    if excess > 0.0:
+        limited_time = min(h, excess / rate)
+        x += direction * rate * limited_time
+        h -= limited_time
     return command + (x - command) * exp(-h / tau)
 
 
 @compiled
-def constant_decays(internal, h, decay):
+def set_decays(internal, h, decay):
     """e^(-h/tau) of the linear states, 0 for the others."""
     for i in range(internal.kind.shape[0]):
         if internal.kind[i] == MAXWELL or internal.kind[i] == AIR:
@@ -258,16 +258,16 @@ def constant_decays(internal, h, decay):
 
 
 @compiled(inline=True)
-def advanced(internal, curves, i, x, drive, limit, h, decay):
+def state_after(internal, curves, i, x, drive, limit, h, decay):
     """State `i` after a step `h` at constant drive."""
     if internal.kind[i] == PAD:
         x += h * internal.parameter[i, 0] * drive
         return x if internal.parameter[i, 1] > 0.0 else min(limit, max(-limit, x))
     if internal.kind[i] == MAXWELL_CURVE:
-        return curve_advanced(curves, internal.curve[i], internal.parameter[i, 1], x, drive, h)
+        return curve_force_after(curves, internal.curve[i], internal.parameter[i, 1], x, drive, h)
     if internal.kind[i] == LAG:
-        return lag_advanced(internal.parameter[i, 0], internal.parameter[i, 1], x, limit, h)
-    if internal.kind[i] == OWN:
+        return lag_after(internal.parameter[i, 0], internal.parameter[i, 1], x, limit, h)
+    if internal.kind[i] == USER:
         return x + h * drive
     end = steady_value(internal, i, drive)
     return end + (x - end) * decay

@@ -76,7 +76,7 @@ _define(operator.truediv, "fdiv")
 _define(operator.neg, "fneg")
 
 
-def _of_one(name):
+def _unary(name):
     """Make the intrinsic of an LLVM function of one number, lane by lane."""
 
     @intrinsic
@@ -89,10 +89,10 @@ def _of_one(name):
     return function
 
 
-square_root, sine, cosine = _of_one("sqrt"), _of_one("sin"), _of_one("cos")
+square_root, sine, cosine = _unary("sqrt"), _unary("sin"), _unary("cos")
 
 
-def _of_two(name):
+def _binary(name):
     """Make the intrinsic of an LLVM function of two numbers, lane by lane."""
 
     @intrinsic
@@ -105,12 +105,12 @@ def _of_two(name):
     return function
 
 
-smaller, larger = _of_two("minnum"), _of_two("maxnum")
+minimum, maximum = _binary("minnum"), _binary("maxnum")
 
 
 @intrinsic
-def beside(typingctx, x):
-    """Each lane's neighbour: of two that belong together the other one."""
+def swap_pairs(typingctx, x):
+    """Lanes with the two of each pair swapped."""
 
     def codegen(context, builder, sig, args):
         mask = ir.Constant(ir.VectorType(INDEX, LANES), [1, 0, 3, 2, 5, 4, 7, 6])
@@ -120,7 +120,7 @@ def beside(typingctx, x):
 
 
 @intrinsic
-def spread(typingctx, x):
+def splat(typingctx, x):
     """One number in all lanes."""
 
     def codegen(context, builder, sig, args):
@@ -164,7 +164,7 @@ def _mask(count):
     return ir.Constant(ir.VectorType(ir.IntType(1), LANES), [k < count for k in range(LANES)])
 
 
-def _few(count):
+def _short_vector(count):
     return ir.VectorType(VECTOR.element, count)
 
 
@@ -173,9 +173,9 @@ def _load(builder, pointer, count):
     if count == LANES:
         return builder.load(pointer, align=8)
     if count in (2, 4):
-        narrow = builder.load(builder.bitcast(pointer, _few(count).as_pointer()), align=8)
+        narrow = builder.load(builder.bitcast(pointer, _short_vector(count).as_pointer()), align=8)
         mask = [min(k, count) for k in range(LANES)]
-        zero = ir.Constant(_few(count), [0.0] * count)
+        zero = ir.Constant(_short_vector(count), [0.0] * count)
         return builder.shuffle_vector(narrow, zero, ir.Constant(ir.VectorType(INDEX, LANES), mask))
     return _load_masked(builder, pointer, _mask(count))
 
@@ -194,7 +194,7 @@ def _store(builder, value, pointer, count):
     if count in (2, 4):
         first = ir.Constant(ir.VectorType(INDEX, count), list(range(count)))
         narrow = builder.shuffle_vector(value, value, first)
-        builder.store(narrow, builder.bitcast(pointer, _few(count).as_pointer()), align=8)
+        builder.store(narrow, builder.bitcast(pointer, _short_vector(count).as_pointer()), align=8)
         return
     bits = ir.VectorType(ir.IntType(1), LANES)
     kind = ir.FunctionType(ir.VoidType(), [VECTOR, ir.PointerType(VECTOR), INDEX, bits])
@@ -202,19 +202,19 @@ def _store(builder, value, pointer, count):
     builder.call(store, [value, pointer, ir.Constant(INDEX, 8), _mask(count)])
 
 
-def _turned(builder, rows):
+def _transpose(builder, rows):
     """Turn eight registers: the k-th of the result holds the k-th number of each."""
 
-    def pairs(these, distance, first, second):
-        mixed = list(these)
+    def pairs(registers, distance, first, second):
+        result = list(registers)
         for k in range(LANES):
             if not k & distance:
-                a, b = these[k], these[k + distance]
+                a, b = registers[k], registers[k + distance]
                 for index, mask in ((k, first), (k + distance, second)):
-                    mixed[index] = builder.shuffle_vector(
+                    result[index] = builder.shuffle_vector(
                         a, b, ir.Constant(ir.VectorType(INDEX, LANES), mask)
                     )
-        return mixed
+        return result
 
     rows = pairs(rows, 1, [0, 8, 2, 10, 4, 12, 6, 14], [1, 9, 3, 11, 5, 13, 7, 15])
     rows = pairs(rows, 2, [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15])
@@ -243,15 +243,15 @@ def load_rows(typingctx, array, rows, column, count):
             _load(builder, _pointer(context, builder, sig.args[0], args[0], offset), number)
             for offset in _offsets(builder, args[1], column)
         ]
-        return context.make_tuple(builder, result, _turned(builder, loaded)[:number])
+        return context.make_tuple(builder, result, _transpose(builder, loaded)[:number])
 
     return result(array, rows, column, count), codegen
 
 
-def _back(builder, values):
+def _to_rows(builder, values):
     columns = cgutils.unpack_tuple(builder, values)
     zero = Registers(builder).zero
-    return len(columns), _turned(builder, columns + [zero] * (LANES - len(columns)))
+    return len(columns), _transpose(builder, columns + [zero] * (LANES - len(columns)))
 
 
 @intrinsic
@@ -260,8 +260,8 @@ def store_rows(typingctx, array, rows, column, values):
 
     def codegen(context, builder, sig, args):
         column = context.cast(builder, args[2], sig.args[2], types.intp)
-        count, turned = _back(builder, args[3])
-        for offset, row in zip(_offsets(builder, args[1], column), turned, strict=True):
+        count, transposed = _to_rows(builder, args[3])
+        for offset, row in zip(_offsets(builder, args[1], column), transposed, strict=True):
             _store(builder, row, _pointer(context, builder, sig.args[0], args[0], offset), count)
         return context.get_dummy_value()
 
@@ -274,12 +274,12 @@ def add_rows(typingctx, array, rows, column, values, n):
 
     def codegen(context, builder, sig, args):
         column = context.cast(builder, args[2], sig.args[2], types.intp)
-        count, turned = _back(builder, args[3])
+        count, transposed = _to_rows(builder, args[3])
         for k, (offset, row) in enumerate(
-            zip(_offsets(builder, args[1], column), turned, strict=True)
+            zip(_offsets(builder, args[1], column), transposed, strict=True)
         ):
-            there = builder.icmp_signed(">", args[4], ir.Constant(INT, k))
-            with builder.if_then(there, likely=True):
+            active = builder.icmp_signed(">", args[4], ir.Constant(INT, k))
+            with builder.if_then(active, likely=True):
                 pointer = _pointer(context, builder, sig.args[0], args[0], offset)
                 total = builder.fadd(_load(builder, pointer, count), row)
                 _store(builder, total, pointer, count)
@@ -289,8 +289,8 @@ def add_rows(typingctx, array, rows, column, values, n):
 
 
 @intrinsic
-def add_to_pairs(typingctx, array, one, two, column, to_one, to_two, n):
-    """Add tuples of eight Lanes to columns of the first `n` rows `one` and rows `two`.
+def add_to_pairs(typingctx, array, rows_1, rows_2, column, values_1, values_2, n):
+    """Add tuples of eight Lanes to columns of the first `n` rows `rows_1` and rows `rows_2`.
 
     Pair after pair: what several pairs add to one row is summed in their order, whichever of them
     share a register.
@@ -299,19 +299,19 @@ def add_to_pairs(typingctx, array, one, two, column, to_one, to_two, n):
     def codegen(context, builder, sig, args):
         column = context.cast(builder, args[3], sig.args[3], types.intp)
         ends = [
-            zip(_offsets(builder, rows, column), _back(builder, values)[1], strict=True)
+            zip(_offsets(builder, rows, column), _to_rows(builder, values)[1], strict=True)
             for rows, values in ((args[1], args[4]), (args[2], args[5]))
         ]
         for k, pair in enumerate(zip(*ends, strict=True)):
-            there = builder.icmp_signed(">", args[6], ir.Constant(INT, k))
-            with builder.if_then(there, likely=True):
+            active = builder.icmp_signed(">", args[6], ir.Constant(INT, k))
+            with builder.if_then(active, likely=True):
                 for offset, row in pair:
                     pointer = _pointer(context, builder, sig.args[0], args[0], offset)
                     total = builder.fadd(_load(builder, pointer, LANES), row)
                     _store(builder, total, pointer, LANES)
         return context.get_dummy_value()
 
-    return types.void(array, one, two, column, to_one, to_two, types.intp), codegen
+    return types.void(array, rows_1, rows_2, column, values_1, values_2, types.intp), codegen
 
 
 @intrinsic
@@ -325,16 +325,16 @@ def load_lanes(typingctx, array, offset):
 
 
 @intrinsic
-def load_few(typingctx, array, offset, n):
+def load_part(typingctx, array, offset, n):
     """As `load_lanes`, of which only the first `n` are read; the others are 0."""
 
     def codegen(context, builder, sig, args):
         kind = ir.VectorType(INT, LANES)
-        one = builder.insert_element(ir.Constant(kind, ir.Undefined), args[2], INDEX(0))
-        same = ir.Constant(ir.VectorType(INDEX, LANES), [0] * LANES)
-        many = builder.shuffle_vector(one, one, same)
-        there = builder.icmp_signed(">", many, ir.Constant(kind, list(range(LANES))))
-        return _load_masked(builder, _pointer(context, builder, sig.args[0], *args[:2]), there)
+        first = builder.insert_element(ir.Constant(kind, ir.Undefined), args[2], INDEX(0))
+        broadcast = ir.Constant(ir.VectorType(INDEX, LANES), [0] * LANES)
+        counts = builder.shuffle_vector(first, first, broadcast)
+        active = builder.icmp_signed(">", counts, ir.Constant(kind, list(range(LANES))))
+        return _load_masked(builder, _pointer(context, builder, sig.args[0], *args[:2]), active)
 
     return lanes(array, types.intp, types.intp), codegen
 
@@ -352,7 +352,7 @@ def store_lanes(typingctx, array, offset, x):
 
 
 @compiled(inline=True)
-def eight_from(first, count):
+def lane_numbers(first, count):
     """The numbers from `first` on; beyond `count` the last one again."""
     last = count - 1
     a, b, c = min(first, last), min(first + 1, last), min(first + 2, last)
@@ -361,7 +361,7 @@ def eight_from(first, count):
 
 
 @compiled(inline=True)
-def eight_in_pairs(first, count):
+def paired_numbers(first, count):
     """2 k and 2 k + 1 of four numbers k from `first` on; beyond `count` those of the last again."""
     last = count - 1
     a, b = 2 * min(first, last), 2 * min(first + 1, last)
@@ -370,15 +370,15 @@ def eight_in_pairs(first, count):
 
 
 @compiled(inline=True)
-def pair_starts(numbers, begin, size, between):
-    """Where rows of a `size` start after `begin`: one a pair, for its second `between` on."""
+def pair_starts(numbers, begin, size, shift):
+    """Where rows of a `size` start after `begin`: one a pair, for its second `shift` on."""
     a, b = begin + (numbers[0] >> 1) * size, begin + (numbers[2] >> 1) * size
     c, d = begin + (numbers[4] >> 1) * size, begin + (numbers[6] >> 1) * size
-    return a, a + between, b, b + between, c, c + between, d, d + between
+    return a, a + shift, b, b + shift, c, c + shift, d, d + shift
 
 
 @compiled(inline=True)
-def eight_of_pairs(index, numbers):
+def gather_pairs(index, numbers):
     """Entries of `index` at the four numbers k of the eight 2 k and 2 k + 1."""
     a, b = index[numbers[0] >> 1], index[numbers[2] >> 1]
     c, d = index[numbers[4] >> 1], index[numbers[6] >> 1]
@@ -386,36 +386,36 @@ def eight_of_pairs(index, numbers):
 
 
 @compiled(inline=True)
-def second_on(rows, between):
-    """The second of each pair of rows so much further on."""
+def shift_seconds(rows, shift):
+    """Rows, the second of each pair shifted."""
     a, b, c, d, e, f, g, h = rows
-    return a, b + between, c, d + between, e, f + between, g, h + between
+    return a, b + shift, c, d + shift, e, f + shift, g, h + shift
 
 
 @compiled(inline=True)
-def eight_of(index, numbers):
+def gather(index, numbers):
     """Entries of `index` at the eight `numbers`."""
     a, b, c, d, e, f, g, h = numbers
     return index[a], index[b], index[c], index[d], index[e], index[f], index[g], index[h]
 
 
 @compiled(inline=True)
-def eight(index, first):
+def gather_from(index, first):
     """Eight entries of `index` from `first` on; beyond its end the last one again."""
-    return eight_of(index, eight_from(first, index.shape[0]))
+    return gather(index, lane_numbers(first, index.shape[0]))
 
 
 @compiled(inline=True)
-def starts(numbers, size):
+def row_starts(numbers, size):
     """Where eight rows of a table with rows of `size` start."""
     a, b, c, d, e, f, g, h = numbers
     return a * size, b * size, c * size, d * size, e * size, f * size, g * size, h * size
 
 
 if numba.config.DISABLE_JIT:
-    smaller, larger, beside = plain.smaller, plain.larger, plain.beside
-    spread, where_beyond, any_beyond = plain.spread, plain.where_beyond, plain.any_beyond
+    minimum, maximum, swap_pairs = plain.minimum, plain.maximum, plain.swap_pairs
+    splat, where_beyond, any_beyond = plain.splat, plain.where_beyond, plain.any_beyond
     square_root, sine, cosine = plain.square_root, plain.sine, plain.cosine
     load_rows, store_rows, add_rows = plain.load_rows, plain.store_rows, plain.add_rows
     load_lanes, store_lanes, add_to_pairs = plain.load_lanes, plain.store_lanes, plain.add_to_pairs
-    load_few = plain.load_few
+    load_part = plain.load_part

@@ -4,15 +4,15 @@ import numpy as np
 
 LANES = 8
 square_root, sine, cosine = np.sqrt, np.sin, np.cos
-smaller, larger = np.fmin, np.fmax
+minimum, maximum = np.fmin, np.fmax
 
 
-def beside(x):
-    """Each lane's neighbour: of two that belong together the other one."""
+def swap_pairs(x):
+    """Lanes with the two of each pair swapped."""
     return x[[1, 0, 3, 2, 5, 4, 7, 6]]
 
 
-def spread(x):
+def splat(x):
     """One number in all lanes."""
     return np.full(LANES, x)
 
@@ -45,10 +45,10 @@ def add_rows(array, rows, column, values, n):
         np.add.at(array.reshape(-1), np.array(rows)[:n] + column + k, value[:n])
 
 
-def add_to_pairs(array, one, two, column, to_one, to_two, n):
+def add_to_pairs(array, rows_1, rows_2, column, values_1, values_2, n):
     """Add to columns of the first `n` of eight pairs of rows."""
-    add_rows(array, one, column, to_one, n)
-    add_rows(array, two, column, to_two, n)
+    add_rows(array, rows_1, column, values_1, n)
+    add_rows(array, rows_2, column, values_2, n)
 
 
 def load_lanes(array, offset):
@@ -56,10 +56,10 @@ def load_lanes(array, offset):
     return array.reshape(-1)[offset : offset + LANES].copy()
 
 
-def load_few(array, offset, n):
+def load_part(array, offset, n):
     """The first `n` of eight numbers that follow each other; the others are 0."""
-    found = array.reshape(-1)[offset : offset + min(n, LANES)]
-    return np.pad(found, (0, LANES - len(found)))
+    lanes = array.reshape(-1)[offset : offset + min(n, LANES)]
+    return np.pad(lanes, (0, LANES - len(lanes)))
 
 
 def store_lanes(array, offset, x):

@@ -56,10 +56,10 @@ STATUS = {
 }
 
 ITERATIONS = 40
-CLOSE = 1e-9  # a Newton step below this share of the size leaves an error of its square
-SMALLEST_STEP = 1e-7  # share of the driver's range: in `CLOSE` branches that meet are alike
-TRANSITION = 1e-3  # share of the size by which arcs with given centres may miss each other
-BEYOND = 1e-3  # share of the driver's range at which a failure is looked at from behind it
+TOLERANCE = 1e-9  # a Newton step below this share of the size leaves an error of its square
+SMALLEST_STEP = 1e-7  # share of the driver's range: in `TOLERANCE` branches that meet are alike
+ARC_GAP = 1e-3  # share of the size by which arcs with given centres may miss each other
+FAILURE_OFFSET = 1e-3  # share of the driver's range at which a failure is looked at from behind it
 
 
 class Linkage(NamedTuple):
@@ -103,14 +103,14 @@ class Linkage(NamedTuple):
 
 
 @compiled(python=False)
-def locate(linkage, lane, q, b, p, at):
+def write_point(linkage, lane, q, b, p, out):
     """Write A u of point p on body b to at[0:2] and its position to at[2:4] [m]."""
     u, v = linkage.point[lane, p, 0], linkage.point[lane, p, 1]
     c, s = np.cos(q[b, 2]), np.sin(q[b, 2])
-    at[0] = c * u - s * v
-    at[1] = s * u + c * v
-    at[2] = q[b, 0] + at[0]
-    at[3] = q[b, 1] + at[1]
+    out[0] = c * u - s * v
+    out[1] = s * u + c * v
+    out[2] = q[b, 0] + out[0]
+    out[3] = q[b, 1] + out[1]
 
 
 @compiled(python=False)
@@ -124,7 +124,7 @@ def add_row(J, row, b, nx, ny, lever):
 
 
 @compiled(python=False)
-def constraints(linkage, lane, arc, q, s, Phi, J, one, two):
+def set_constraints(linkage, lane, arc, q, s, Phi, J, r_1, r_2):
     """Residual and Jacobian of joints and driver.
 
     Parameters
@@ -137,7 +137,7 @@ def constraints(linkage, lane, arc, q, s, Phi, J, one, two):
         Driver [m or rad].
     Phi, J : shapes (n,), (n, n)
         Written.
-    one, two : shape (4,)
+    r_1, r_2 : shape (4,)
         Work arrays.
     """
     n, joint = 3 * linkage.n_bodies, linkage.joint
@@ -157,32 +157,32 @@ def constraints(linkage, lane, arc, q, s, Phi, J, one, two):
             p2 = linkage.arc_point[arc[k]]
             radius = linkage.arc_ends[arc[k], 4] * linkage.arc_radius[lane, arc[k]]
         b1, b2 = linkage.point_body[p1], linkage.point_body[p2]
-        locate(linkage, lane, q, b1, p1, one)
-        locate(linkage, lane, q, b2, p2, two)
-        dx, dy = one[2] - two[2], one[3] - two[3]
+        write_point(linkage, lane, q, b1, p1, r_1)
+        write_point(linkage, lane, q, b2, p2, r_2)
+        dx, dy = r_1[2] - r_2[2], r_1[3] - r_2[3]
         if kind == REVOLUTE:
             Phi[row], Phi[row + 1] = dx, dy
-            add_row(J, row, b1, 1.0, 0.0, -one[1])
-            add_row(J, row + 1, b1, 0.0, 1.0, one[0])
-            add_row(J, row, b2, -1.0, 0.0, two[1])
-            add_row(J, row + 1, b2, 0.0, -1.0, -two[0])
+            add_row(J, row, b1, 1.0, 0.0, -r_1[1])
+            add_row(J, row + 1, b1, 0.0, 1.0, r_1[0])
+            add_row(J, row, b2, -1.0, 0.0, r_2[1])
+            add_row(J, row + 1, b2, 0.0, -1.0, -r_2[0])
         elif kind == SLOT:
             angle = q[b2, 2] + linkage.value[lane, k, 0]
             nx, ny = -np.sin(angle), np.cos(angle)
             Phi[row] = nx * dx + ny * dy - linkage.value[lane, k, 1]
-            add_row(J, row, b1, nx, ny, ny * one[0] - nx * one[1])
+            add_row(J, row, b1, nx, ny, ny * r_1[0] - nx * r_1[1])
             turning = nx * dy - ny * dx  # n turns with body 2: dn = (-ny, nx)
-            add_row(J, row, b2, -nx, -ny, -(ny * two[0] - nx * two[1]) + turning)
+            add_row(J, row, b2, -nx, -ny, -(ny * r_2[0] - nx * r_2[1]) + turning)
         else:
             Phi[row] = (dx * dx + dy * dy - radius * radius) / (2.0 * radius)
             nx, ny = dx / radius, dy / radius
-            add_row(J, row, b1, nx, ny, ny * one[0] - nx * one[1])
-            add_row(J, row, b2, -nx, -ny, -(ny * two[0] - nx * two[1]))
-    drive(linkage, lane, q, s, Phi, J, n - 1, one, two)
+            add_row(J, row, b1, nx, ny, ny * r_1[0] - nx * r_1[1])
+            add_row(J, row, b2, -nx, -ny, -(ny * r_2[0] - nx * r_2[1]))
+    write_driver_row(linkage, lane, q, s, Phi, J, n - 1, r_1, r_2)
 
 
 @compiled(python=False)
-def drive(linkage, lane, q, s, Phi, J, row, one, two):
+def write_driver_row(linkage, lane, q, s, Phi, J, row, r_1, r_2):
     """Write the driver's residual and row of the Jacobian."""
     kind, p1, p2 = linkage.driver[0], linkage.driver[1], linkage.driver[2]
     c = linkage.driver_value[lane]
@@ -191,26 +191,26 @@ def drive(linkage, lane, q, s, Phi, J, row, one, two):
         add_row(J, row, p1, 0.0, 0.0, 1.0)
         return
     b1 = linkage.point_body[p1]
-    locate(linkage, lane, q, b1, p1, one)
+    write_point(linkage, lane, q, b1, p1, r_1)
     if kind == LENGTH:
         b2 = linkage.point_body[p2]
-        locate(linkage, lane, q, b2, p2, two)
-        dx, dy = one[2] - two[2], one[3] - two[3]
+        write_point(linkage, lane, q, b2, p2, r_2)
+        dx, dy = r_1[2] - r_2[2], r_1[3] - r_2[3]
         length = np.sqrt(dx * dx + dy * dy)
         Phi[row] = length - c - s
         nx, ny = dx / length, dy / length
-        add_row(J, row, b1, nx, ny, ny * one[0] - nx * one[1])
-        add_row(J, row, b2, -nx, -ny, -(ny * two[0] - nx * two[1]))
+        add_row(J, row, b1, nx, ny, ny * r_1[0] - nx * r_1[1])
+        add_row(J, row, b2, -nx, -ny, -(ny * r_2[0] - nx * r_2[1]))
     elif kind == X:
-        Phi[row] = one[2] - c - s
-        add_row(J, row, b1, 1.0, 0.0, -one[1])
+        Phi[row] = r_1[2] - c - s
+        add_row(J, row, b1, 1.0, 0.0, -r_1[1])
     else:
-        Phi[row] = one[3] - c - s
-        add_row(J, row, b1, 0.0, 1.0, one[0])
+        Phi[row] = r_1[3] - c - s
+        add_row(J, row, b1, 0.0, 1.0, r_1[0])
 
 
 @compiled(python=False)
-def curvature(linkage, lane, arc, q, v, right, one, two):
+def write_acceleration_side(linkage, lane, arc, q, v, right, r_1, r_2):
     """Write `-(Phi_qq v) v`, the right-hand side for the second derivative; v as q."""
     n, joint = 3 * linkage.n_bodies, linkage.joint
     for i in range(n):
@@ -231,9 +231,9 @@ def curvature(linkage, lane, arc, q, v, right, one, two):
         if kind == PARALLEL:
             continue
         b1 = linkage.point_body[p1]
-        locate(linkage, lane, q, b1, p1, one)
+        write_point(linkage, lane, q, b1, p1, r_1)
         w1 = v[b1, 2]
-        gx, gy = -one[0] * w1 * w1, -one[1] * w1 * w1
+        gx, gy = -r_1[0] * w1 * w1, -r_1[1] * w1 * w1
         if kind == -X:
             right[row] = -gx
             continue
@@ -241,20 +241,20 @@ def curvature(linkage, lane, arc, q, v, right, one, two):
             right[row] = -gy
             continue
         b2 = linkage.point_body[p2]
-        locate(linkage, lane, q, b2, p2, two)
+        write_point(linkage, lane, q, b2, p2, r_2)
         w2 = v[b2, 2]
-        gx += two[0] * w2 * w2
-        gy += two[1] * w2 * w2
-        dx, dy = one[2] - two[2], one[3] - two[3]
-        vx = v[b1, 0] - one[1] * w1 - v[b2, 0] + two[1] * w2
-        vy = v[b1, 1] + one[0] * w1 - v[b2, 1] - two[0] * w2
+        gx += r_2[0] * w2 * w2
+        gy += r_2[1] * w2 * w2
+        dx, dy = r_1[2] - r_2[2], r_1[3] - r_2[3]
+        vx = v[b1, 0] - r_1[1] * w1 - v[b2, 0] + r_2[1] * w2
+        vy = v[b1, 1] + r_1[0] * w1 - v[b2, 1] - r_2[0] * w2
         if kind == REVOLUTE:
             right[row], right[row + 1] = -gx, -gy
         elif kind == SLOT:
             angle = q[b2, 2] + linkage.value[lane, k, 0]
             nx, ny = -np.sin(angle), np.cos(angle)
-            twice = 2.0 * w2 * (nx * vy - ny * vx)
-            right[row] = -(nx * gx + ny * gy + twice - w2 * w2 * (nx * dx + ny * dy))
+            coriolis = 2.0 * w2 * (nx * vy - ny * vx)
+            right[row] = -(nx * gx + ny * gy + coriolis - w2 * w2 * (nx * dx + ny * dy))
         elif kind == -LENGTH:
             length = np.sqrt(dx * dx + dy * dy)
             rate = (dx * vx + dy * vy) / length
@@ -264,9 +264,9 @@ def curvature(linkage, lane, arc, q, v, right, one, two):
 
 
 @compiled(python=False)
-def worst_joint(linkage, arc, q, s, Phi, J, one, two):
+def worst_joint(linkage, arc, q, s, Phi, J, r_1, r_2):
     """Joint with the largest residual; the number of joints stands for the driver."""
-    constraints(linkage, 0, arc, q, s, Phi, J, one, two)
+    set_constraints(linkage, 0, arc, q, s, Phi, J, r_1, r_2)
     joint, largest = 0, -1.0
     for k in range(linkage.joint.shape[0]):
         row = linkage.joint[k, 3]
@@ -279,20 +279,20 @@ def worst_joint(linkage, arc, q, s, Phi, J, one, two):
 
 
 @compiled(python=False)
-def move_along_cams(linkage, q, arc, one, two):
+def move_along_cams(linkage, q, arc, r_1, r_2):
     """Put every roller on the arc that it has reached: 1 if moved, 0 if not, -1-k off cam k."""
-    moved = 0
+    changed = 0
     for k in range(linkage.joint.shape[0]):
         if linkage.joint[k, 0] != CAM:
             continue
         p1, a = linkage.joint[k, 1], arc[k]
         first = linkage.joint[k, 4]
         last = first + linkage.joint[k, 5] - 1
-        locate(linkage, 0, q, linkage.point_body[p1], p1, one)
+        write_point(linkage, 0, q, linkage.point_body[p1], p1, r_1)
         p2 = linkage.arc_point[a]
         b2 = linkage.point_body[p2]
-        locate(linkage, 0, q, b2, p2, two)
-        dx, dy = one[2] - two[2], one[3] - two[3]
+        write_point(linkage, 0, q, b2, p2, r_2)
+        dx, dy = r_1[2] - r_2[2], r_1[3] - r_2[3]
         c, s = np.cos(q[b2, 2]), np.sin(q[b2, 2])
         u, v = c * dx + s * dy, -s * dx + c * dy
         turn = linkage.arc_ends[a, 4]
@@ -303,10 +303,10 @@ def move_along_cams(linkage, q, arc, one, two):
             if a == last:
                 return -1 - k
             arc[k] = a + 1
-            moved = 1
+            changed = 1
         elif past_begin < edge:
             if a == first:
                 return -1 - k
             arc[k] = a - 1
-            moved = 1
-    return moved
+            changed = 1
+    return changed

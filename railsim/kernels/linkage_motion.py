@@ -4,26 +4,26 @@ import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.linkage import (
-    BEYOND,
+    ARC_GAP,
     BEYOND_CAM,
     BRANCH_JUMP,
-    CLOSE,
     DEAD_POINT,
+    FAILURE_OFFSET,
     ITERATIONS,
     LOST_ASSEMBLY,
     NO_ASSEMBLY,
     OK,
     SMALLEST_STEP,
-    TRANSITION,
-    constraints,
-    curvature,
+    TOLERANCE,
     move_along_cams,
+    set_constraints,
     worst_joint,
+    write_acceleration_side,
 )
 
 
 @compiled(python=False)
-def factor(J, pivots, n):
+def factorise(J, pivots, n):
     """LU factors in place with row pivoting; returns the sign of the determinant, 0 if singular."""
     sign = 1.0
     for k in range(n):
@@ -51,7 +51,7 @@ def factor(J, pivots, n):
 
 @compiled(python=False)
 def substitute(J, pivots, x, n):
-    """Solve with the factors of `factor`; x is overwritten."""
+    """Solve with the factors of `factorise`; x is overwritten."""
     for k in range(n):
         best = pivots[k]
         if best != k:
@@ -66,7 +66,7 @@ def substitute(J, pivots, x, n):
 
 
 @compiled(python=False)
-def derivatives(linkage, arc, q, J, pivots, x, v, a, one, two):
+def derivatives(linkage, arc, q, J, pivots, x, v, a, r_1, r_2):
     """Write q' and q'' to v and a (as q), J holding the factors."""
     n = 3 * linkage.n_bodies
     for i in range(n):
@@ -75,20 +75,20 @@ def derivatives(linkage, arc, q, J, pivots, x, v, a, one, two):
     substitute(J, pivots, x, n)
     for i in range(n):
         v[1 + i // 3, i % 3] = x[i]
-    curvature(linkage, 0, arc, q, v, x, one, two)
+    write_acceleration_side(linkage, 0, arc, q, v, x, r_1, r_2)
     substitute(J, pivots, x, n)
     for i in range(n):
         a[1 + i // 3, i % 3] = x[i]
 
 
 @compiled(python=False)
-def newton(linkage, arc, q, s, Phi, J, pivots, one, two):
+def assemble(linkage, arc, q, s, Phi, J, pivots, r_1, r_2):
     """Assemble at s from the pose q, which is overwritten: determinant's sign, 0 on failure."""
     n = 3 * linkage.n_bodies
     done = False
     for _ in range(ITERATIONS):
-        constraints(linkage, 0, arc, q, s, Phi, J, one, two)
-        sign = factor(J, pivots, n)
+        set_constraints(linkage, 0, arc, q, s, Phi, J, r_1, r_2)
+        sign = factorise(J, pivots, n)
         if sign == 0.0:
             return 0.0
         if done:
@@ -102,23 +102,23 @@ def newton(linkage, arc, q, s, Phi, J, pivots, one, two):
             if not size < 1e6:
                 return 0.0
             largest = max(largest, size)
-        done = largest < CLOSE
+        done = largest < TOLERANCE
     return 0.0
 
 
 @compiled(python=False)
-def settle(linkage, arc, q, s, Phi, J, pivots, one, two):
-    """`newton` with every roller on its arc: determinant's sign, 0 or -2-k on failure."""
-    sign = newton(linkage, arc, q, s, Phi, J, pivots, one, two)
+def assemble_on_cams(linkage, arc, q, s, Phi, J, pivots, r_1, r_2):
+    """`assemble` with every roller on its arc: determinant's sign, 0 or -2-k on failure."""
+    sign = assemble(linkage, arc, q, s, Phi, J, pivots, r_1, r_2)
     for _ in range(4 * linkage.arc_point.shape[0]):
         if sign == 0.0:
             return 0.0
-        moved = move_along_cams(linkage, q, arc, one, two)
-        if moved < 0:
-            return moved - 1.0
-        if moved == 0:
+        changed = move_along_cams(linkage, q, arc, r_1, r_2)
+        if changed < 0:
+            return changed - 1.0
+        if changed == 0:
             return sign
-        sign = newton(linkage, arc, q, s, Phi, J, pivots, one, two)
+        sign = assemble(linkage, arc, q, s, Phi, J, pivots, r_1, r_2)
     return sign
 
 
@@ -137,7 +137,7 @@ def predict(linkage, h, now, v, a, new):
 
 
 @compiled(python=False)
-def correction_of(linkage, h, now, v, a, new):
+def prediction_error(linkage, h, now, v, a, new):
     """Largest difference of `new` from the pose, or from its derivatives, as predicted."""
     largest = 0.0
     for k in range(1, linkage.n_bodies + 1):
@@ -151,7 +151,7 @@ def correction_of(linkage, h, now, v, a, new):
 
 
 @compiled(in_loop=False)
-def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
+def trace(linkage, s, start, arc_start, q, v, a, arcs, failure):
     """Positions and derivatives for all values of the driver, on one branch.
 
     Newton's method from the second-order prediction; a step is halved while the correction is
@@ -184,45 +184,45 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
     n = 3 * nb
     Phi, J = np.zeros(n), np.zeros((n, n))
     pivots, x = np.zeros(n, dtype=np.int64), np.zeros(n)
-    one, two = np.zeros(4), np.zeros(4)
+    r_1, r_2 = np.zeros(4), np.zeros(4)
     now, v_now, a_now = start.copy(), np.zeros((nb + 1, 3)), np.zeros((nb + 1, 3))
     new, v_new, a_new = start.copy(), np.zeros((nb + 1, 3)), np.zeros((nb + 1, 3))
-    none, arc, arc_new = np.zeros((nb + 1, 3)), arc_start.copy(), arc_start.copy()
-    sign = settle(linkage, arc, now, s[0], Phi, J, pivots, one, two)
+    zero, arc, arc_new = np.zeros((nb + 1, 3)), arc_start.copy(), arc_start.copy()
+    sign = assemble_on_cams(linkage, arc, now, s[0], Phi, J, pivots, r_1, r_2)
     failure[0] = s[0]
     if sign < -1.5:
         failure[1] = -2.0 - sign
         return BEYOND_CAM, 0
     if sign == 0.0:
-        failure[1] = worst_joint(linkage, arc, start, s[0], Phi, J, one, two)
+        failure[1] = worst_joint(linkage, arc, start, s[0], Phi, J, r_1, r_2)
         return NO_ASSEMBLY, 0
-    reach = max(abs(s[-1] - s[0]), 1e-3 * linkage.size)
+    driver_range = max(abs(s[-1] - s[0]), 1e-3 * linkage.size)
     for i in range(1, s.shape[0]):
-        reach = max(reach, abs(s[i] - s[0]))
-    at = s[0]
-    derivatives(linkage, arc, now, J, pivots, x, v_now, a_now, one, two)
+        driver_range = max(driver_range, abs(s[i] - s[0]))
+    s_now = s[0]
+    derivatives(linkage, arc, now, J, pivots, x, v_now, a_now, r_1, r_2)
     for i in range(s.shape[0]):
-        step = s[i] - at
-        while at != s[i]:
-            rest = s[i] - at
+        step = s[i] - s_now
+        while s_now != s[i]:
+            rest = s[i] - s_now
             h = rest if abs(step) >= abs(rest) else step
             speed = predict(linkage, h, now, v_now, a_now, new)
             for k in range(arc.shape[0]):
                 arc_new[k] = arc[k]
-            target = s[i] if h == rest else at + h
-            sign_new = settle(linkage, arc_new, new, target, Phi, J, pivots, one, two)
-            correction = correction_of(linkage, h, now, v_now, a_now, new)
-            allowed = 0.2 * speed
+            target = s[i] if h == rest else s_now + h
+            sign_new = assemble_on_cams(linkage, arc_new, new, target, Phi, J, pivots, r_1, r_2)
+            correction = prediction_error(linkage, h, now, v_now, a_now, new)
+            limit = 0.2 * speed
             for k in range(arc.shape[0]):
                 if arc_new[k] != arc[k]:
-                    allowed += TRANSITION
-            smooth = sign_new == sign and correction <= allowed + 1e-9 and speed < 0.5
+                    limit += ARC_GAP
+            smooth = sign_new == sign and correction <= limit + 1e-9 and speed < 0.5
             if smooth:
-                derivatives(linkage, arc_new, new, J, pivots, x, v_new, a_new, one, two)
-                change = abs(h) * correction_of(linkage, h, v_now, a_now, none, v_new)
-                smooth = change <= 3.0 * allowed
+                derivatives(linkage, arc_new, new, J, pivots, x, v_new, a_new, r_1, r_2)
+                change = abs(h) * prediction_error(linkage, h, v_now, a_now, zero, v_new)
+                smooth = change <= 3.0 * limit
             if smooth:
-                at = target
+                s_now = target
                 step = 2.0 * h
                 for k in range(nb + 1):
                     for m in range(3):
@@ -231,10 +231,10 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
                     arc[k] = arc_new[k]
                 continue
             step = 0.5 * h
-            if abs(step) < SMALLEST_STEP * reach:
-                beyond = at + BEYOND * reach * np.sign(h)
-                failure[0] = at
-                failure[1] = worst_joint(linkage, arc, now, beyond, Phi, J, one, two)
+            if abs(step) < SMALLEST_STEP * driver_range:
+                beyond = s_now + FAILURE_OFFSET * driver_range * np.sign(h)
+                failure[0] = s_now
+                failure[1] = worst_joint(linkage, arc, now, beyond, Phi, J, r_1, r_2)
                 if sign_new < -1.5:
                     failure[1] = -2.0 - sign_new
                     return BEYOND_CAM, i
@@ -242,7 +242,7 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
                 for k in range(nb + 1):
                     for m in range(3):
                         new[k, m] = now[k, m]
-                if newton(linkage, arc, new, beyond, Phi, J, pivots, one, two) == 0.0:
+                if assemble(linkage, arc, new, beyond, Phi, J, pivots, r_1, r_2) == 0.0:
                     return LOST_ASSEMBLY, i
                 if sign_new != sign:
                     return DEAD_POINT, i
@@ -281,43 +281,43 @@ def tangents(real, linkage, s, q, v, a, arcs, second):
     Phi_r, J_r, x = np.zeros(n), np.zeros((n, n)), np.zeros(n)
     Phi, J = np.zeros(n, dtype=np.complex128), np.zeros((n, n), dtype=np.complex128)
     pivots = np.zeros(n, dtype=np.int64)
-    one_r, two_r, here = np.zeros(4), np.zeros(4), np.zeros((linkage.n_bodies + 1, 3))
-    one, two = np.zeros(4, dtype=np.complex128), np.zeros(4, dtype=np.complex128)
+    r_1r, r_2r, q_r = np.zeros(4), np.zeros(4), np.zeros((linkage.n_bodies + 1, 3))
+    r_1, r_2 = np.zeros(4, dtype=np.complex128), np.zeros(4, dtype=np.complex128)
     for i in range(q.shape[1]):
         for k in range(n):
-            here[1 + k // 3, k % 3] = q[0, i, 1 + k // 3, k % 3].real
-        constraints(real, 0, arcs[i], here, s[0, i].real, Phi_r, J_r, one_r, two_r)
-        factor(J_r, pivots, n)
+            q_r[1 + k // 3, k % 3] = q[0, i, 1 + k // 3, k % 3].real
+        set_constraints(real, 0, arcs[i], q_r, s[0, i].real, Phi_r, J_r, r_1r, r_2r)
+        factorise(J_r, pivots, n)
         for lane in range(q.shape[0]):
-            at, rate, bend = q[lane, i], v[lane, i], a[lane, i]
-            constraints(linkage, lane, arcs[i], at, s[lane, i], Phi, J, one, two)
+            q_i, v_i, a_i = q[lane, i], v[lane, i], a[lane, i]
+            set_constraints(linkage, lane, arcs[i], q_i, s[lane, i], Phi, J, r_1, r_2)
             for k in range(n):
                 x[k] = -Phi[k].imag
             substitute(J_r, pivots, x, n)
             for k in range(n):
-                at[1 + k // 3, k % 3] += 1j * x[k]
-            constraints(linkage, lane, arcs[i], at, s[lane, i], Phi, J, one, two)
+                q_i[1 + k // 3, k % 3] += 1j * x[k]
+            set_constraints(linkage, lane, arcs[i], q_i, s[lane, i], Phi, J, r_1, r_2)
             for k in range(n):
                 x[k] = 0.0
                 for m in range(n):
-                    x[k] -= J[k, m].imag * rate[1 + m // 3, m % 3].real
+                    x[k] -= J[k, m].imag * v_i[1 + m // 3, m % 3].real
             substitute(J_r, pivots, x, n)
             for k in range(n):
-                rate[1 + k // 3, k % 3] += 1j * x[k]
+                v_i[1 + k // 3, k % 3] += 1j * x[k]
             if second:
-                curvature(linkage, lane, arcs[i], at, rate, Phi, one, two)
+                write_acceleration_side(linkage, lane, arcs[i], q_i, v_i, Phi, r_1, r_2)
                 for k in range(n):
                     x[k] = Phi[k].imag
                     for m in range(n):
-                        x[k] -= J[k, m].imag * bend[1 + m // 3, m % 3].real
+                        x[k] -= J[k, m].imag * a_i[1 + m // 3, m % 3].real
                 substitute(J_r, pivots, x, n)
                 for k in range(n):
-                    bend[1 + k // 3, k % 3] += 1j * x[k]
+                    a_i[1 + k // 3, k % 3] += 1j * x[k]
 
 
 @compiled(in_loop=False)
 def jacobians(linkage, s, q, arcs, residual, J):
     """Residuals, shape (position, n), and Jacobians, shape (position, n, n), at given poses."""
-    one, two = np.zeros(4), np.zeros(4)
+    r_1, r_2 = np.zeros(4), np.zeros(4)
     for i in range(q.shape[0]):
-        constraints(linkage, 0, arcs[i], q[i], s[i], residual[i], J[i], one, two)
+        set_constraints(linkage, 0, arcs[i], q[i], s[i], residual[i], J[i], r_1, r_2)

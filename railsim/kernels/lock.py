@@ -9,31 +9,31 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 POLL = 0.02  # s between two tries, between which Ctrl-C is heard
-_held: set[Path] = set()
+_lock_paths: set[Path] = set()
 
 
 @contextmanager
-def alone(path: Path) -> Iterator[None]:
+def exclusive(path: Path) -> Iterator[None]:
     """Hold a file of the cache as a lock within the block; a process may take it again in it.
 
     Without a word where there are no locks, or nothing can be stored: each process compiles then.
     The lock ends with its process.
     """
-    handle = None if path in _held else _locked(path)
+    handle = None if path in _lock_paths else _acquire(path)
     if handle is None:
         yield
         return
-    _held.add(path)
+    _lock_paths.add(path)
     try:
         yield
     finally:
-        _held.discard(path)
+        _lock_paths.discard(path)
         with suppress(OSError):
             path.unlink()
         os.close(handle)
 
 
-def _locked(path: Path) -> int | None:
+def _acquire(path: Path) -> int | None:
     """Open and lock a file; None where that cannot be done."""
     from filelock import lock_descriptor  # takes 20 ms, and is for those that compile
 

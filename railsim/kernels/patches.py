@@ -76,8 +76,8 @@ class CreepLaw(NamedTuple):
     table : float32[], scale : float64[k, 4]   table of the full theory
                          (`railsim.contact.creep_table`); else empty
     curve : float64[k, 2]   measured adhesion curve: creepage, T/(mu N) [1]; else empty
-    own : int            address of a law of one's own, else 0
-    block : float64[...]    its block, see `own_laws`
+    user_law : int       address of a law of one's own, else 0
+    block : float64[...]    its block, see `user_laws`
     """
 
     number: int
@@ -89,7 +89,7 @@ class CreepLaw(NamedTuple):
     table: np.ndarray
     scale: np.ndarray
     curve: np.ndarray
-    own: int
+    user_law: int
     block: np.ndarray
 
 
@@ -108,7 +108,7 @@ class CreepScratch(NamedTuple):
 
 
 @compiled(python=False)
-def side_by_side(patch):
+def patch_arrays(patch):
     """Return the arrays of `Work.patch` that the creep laws take."""
     return Patches(
         patch[A], patch[B], patch[MU_N], patch[C11], patch[C22], patch[C23], patch[C33],

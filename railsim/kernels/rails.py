@@ -22,28 +22,28 @@ import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.lanes import (
-    beside,
-    eight_in_pairs,
-    eight_of_pairs,
+    gather_pairs,
     load_lanes,
     load_rows,
     pair_starts,
-    second_on,
+    paired_numbers,
+    row_starts,
+    shift_seconds,
     square_root,
-    starts,
     store_rows,
+    swap_pairs,
 )
 from railsim.kernels.rotation import arc_sine_lanes
 from railsim.kernels.state import ARC_LENGTH, SPEED, smoothed_begin
-from railsim.kernels.system import AHEAD, LOCATED
+from railsim.kernels.system import HORIZON, RAILS_AT
 from railsim.kernels.track_frame import (
     MU_LEFT,
     Y_LEFT,
     Y_RIGHT,
     Z_LEFT,
     Z_RIGHT,
-    cell_of,
     polynomial,
+    track_cell,
 )
 
 PAIRS = 4  # wheelsets in eight lanes, one a rail: left, right, left, ...
@@ -57,7 +57,7 @@ PLANE_SIZE = 16  # whole cache lines
 
 # columns of Work.rail[w, side]: friction; distance of the rail to the right of its nominal position
 # in the plane, its slope; slope of the rail in the frame's lateral direction, that slope's change
-FRICTION, ASIDE, ASIDE_SLOPE, RAIL_SLOPE, RAIL_BEND = range(5)
+FRICTION, SHIFT, SHIFT_SLOPE, RAIL_SLOPE, RAIL_BEND = range(5)
 RAIL_SIZE = 8
 
 # columns of Work.rail_motion[w, side]
@@ -66,7 +66,7 @@ MOTION_SIZE = 4
 
 # columns of Work.rate_change[side]: how the rates of a wheel beside its rail are about to change
 CHANGE_Y, CHANGE_Z, CHANGE_ROLL = range(3)
-CHANGES = 4
+RATE_CHANGE_SIZE = 4
 
 
 @compiled
@@ -75,19 +75,19 @@ def locate_rails(system, work, s):
 
     Beyond the end of the track's table a wheelset keeps what was under it.
     """
-    if work.watch[LOCATED] == s:
+    if work.stepping[RAILS_AT] == s:
         return
-    work.watch[LOCATED] = s
+    work.stepping[RAILS_AT] = s
     track, body, frame = system.track, system.contact.body, system.bodies.frame
     for w in range(body.shape[0]):
-        i, u = cell_of(track, s + system.frame_offset[frame[body[w]]])
+        i, u = track_cell(track, s + system.frame_offset[frame[body[w]]])
         if i >= 0:
             work.rail_cell[w], work.rail_u[w] = i, u
-    locate_in_cells(track, work.rail_cell, work.rail_u, work.plane, work.rail)
+    interpolate_rails(track, work.rail_cell, work.rail_u, work.plane, work.rail)
 
 
 @compiled(python=False)
-def locate_in_cells(track, cell, cell_u, plane, rail):
+def interpolate_rails(track, cell, cell_u, plane, rail):
     """Rails of wheelsets at `cell_u` [m] in the cells `cell` of a track's tables.
 
     Parameters
@@ -98,19 +98,19 @@ def locate_in_cells(track, cell, cell_u, plane, rail):
         Written; where no rail is displaced only the friction.
     """
     for first in range(0, cell.shape[0], PAIRS):
-        wheels = eight_in_pairs(first, cell.shape[0])
-        i, rails = starts(eight_of_pairs(cell, wheels), 24), starts(wheels, RAIL_SIZE)
+        wheels = paired_numbers(first, cell.shape[0])
+        i, rails = row_starts(gather_pairs(cell, wheels), 24), row_starts(wheels, RAIL_SIZE)
         u = load_rows(cell_u, pair_starts(wheels, 0, 1, 0), 0, 1)[0]
-        m0, m1, m2, m3 = load_rows(track.rail, second_on(i, 4), 4 * MU_LEFT, 4)
+        m0, m1, m2, m3 = load_rows(track.rail, shift_seconds(i, 4), 4 * MU_LEFT, 4)
         friction, _, _ = polynomial(m0, m1, m2, m3, u)
         if not track.has_irregularity:
             store_rows(rail, rails, FRICTION, (friction,))
             continue
-        y0, y1, y2, y3, z0, z1, z2, z3 = load_rows(track.rail, second_on(i, 8), 0, 8)
+        y0, y1, y2, y3, z0, z1, z2, z3 = load_rows(track.rail, shift_seconds(i, 8), 0, 8)
         y, y_slope, y_bend = polynomial(y0, y1, y2, y3, u)
         z, z_slope, z_bend = polynomial(z0, z1, z2, z3, u)
         side = load_lanes(SIDES, 0)
-        sine = side * (z - beside(z)) / track.rail_base
+        sine = side * (z - swap_pairs(z)) / track.rail_base
         cosine = square_root(1.0 - sine * sine)
         planes = pair_starts(wheels, 0, PLANE_SIZE, 0)
         store_rows(
@@ -118,14 +118,14 @@ def locate_in_cells(track, cell, cell_u, plane, rail):
             planes,
             0,
             (
-                0.5 * (y + beside(y)),
-                0.5 * (z + beside(z)),
-                0.5 * (y_slope + beside(y_slope)),
-                0.5 * (z_slope + beside(z_slope)),
+                0.5 * (y + swap_pairs(y)),
+                0.5 * (z + swap_pairs(z)),
+                0.5 * (y_slope + swap_pairs(y_slope)),
+                0.5 * (z_slope + swap_pairs(z_slope)),
                 arc_sine_lanes(sine),
                 sine,
                 cosine,
-                side * (z_slope - beside(z_slope)) / (track.rail_base * cosine),
+                side * (z_slope - swap_pairs(z_slope)) / (track.rail_base * cosine),
             ),
         )
         third, per_width = 6.0 * z3, side / (track.rail_base * cosine)
@@ -134,30 +134,30 @@ def locate_in_cells(track, cell, cell_u, plane, rail):
             planes,
             BEND_Z,
             (
-                0.5 * (z_bend + beside(z_bend)),
-                per_width * (z_bend - beside(z_bend)),
-                0.5 * (third + beside(third)),
-                per_width * (third - beside(third)),
+                0.5 * (z_bend + swap_pairs(z_bend)),
+                per_width * (z_bend - swap_pairs(z_bend)),
+                0.5 * (third + swap_pairs(third)),
+                per_width * (third - swap_pairs(third)),
             ),
         )
-        wider, widening = 0.5 * (y - beside(y)), 0.5 * (y_slope - beside(y_slope))
-        store_rows(rail, rails, 0, (friction, wider, widening, y_slope, y_bend))
+        shift, shift_slope = 0.5 * (y - swap_pairs(y)), 0.5 * (y_slope - swap_pairs(y_slope))
+        store_rows(rail, rails, 0, (friction, shift, shift_slope, y_slope, y_bend))
 
 
 @compiled(python=False)
 def predict_rate_changes(system, work, w, state):
-    """How the rates of wheelset `w` beside its rails will have changed after `AHEAD`.
+    """How the rates of wheelset `w` beside its rails will have changed after `HORIZON`.
 
     The rails' slopes are those where the wheelset will then be; the wheelset is taken to keep its
     acceleration, so that nothing changes for one that follows its rails.  Of `Work.rate_change` are
     written rates of y, z [m/s] and roll [rad/s] by side; zero beyond the end of the track's table.
     """
-    plane, rail, rate_change, h = work.plane, work.rail, work.rate_change, work.watch[AHEAD]
+    plane, rail, rate_change, h = work.plane, work.rail, work.rate_change, work.stepping[HORIZON]
     b = system.contact.body[w]
     speed = state[SPEED]
-    own = smoothed_begin(system.bodies.kind.shape[0], system.internal.kind.shape[0]) + 6 * b
+    row = smoothed_begin(system.bodies.kind.shape[0], system.internal.kind.shape[0]) + 6 * b
     s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[b]] + speed * h
-    i, u = cell_of(system.track, s)
+    i, u = track_cell(system.track, s)
     change = speed if i >= 0 else 0.0
     for side in range(2):
         y_slope, z_slope = 0.0, 0.0
@@ -169,14 +169,14 @@ def predict_rate_changes(system, work, w, state):
         arm = (side - 0.5) * system.track.rail_base * plane[w, COSINE]
         now = plane[w, SLOPE_Z] + arm * plane[w, ROLL_SLOPE]
         rate_change[side, CHANGE_Y] = (
-            change * (rail[w, side, RAIL_SLOPE] - y_slope) + h * state[own + 1]
+            change * (rail[w, side, RAIL_SLOPE] - y_slope) + h * state[row + 1]
         )
-        rate_change[side, CHANGE_Z] = change * (now - z_slope) + h * state[own + 2]
-        rate_change[side, CHANGE_ROLL] = h * state[own + 3]
+        rate_change[side, CHANGE_Z] = change * (now - z_slope) + h * state[row + 2]
+        rate_change[side, CHANGE_ROLL] = h * state[row + 3]
 
 
 @compiled(inline=True)
-def against_rails(plane, rail_base, w, y, z, roll, yaw, yielded):
+def position_on_rails(plane, rail_base, w, y, z, roll, yaw, deflection):
     """Lateral displacement and roll of wheelset `w` against its irregular, deflected rails.
 
     The displacement is that of the wheelset's centre from the middle of the rails, along the line
@@ -190,23 +190,23 @@ def against_rails(plane, rail_base, w, y, z, roll, yaw, yielded):
         See `TrackTables` [m].
     y, z, roll, yaw : float
         Centre of the wheelset in the track frame, z from the rail tops [m]; roll and yaw [rad].
-    yielded : float64[w, 2, 2 or more]
+    deflection : float64[w, 2, 2 or more]
         y and z by which each rail yields, in the axes of their plane [m].
     """
-    left_y, left_z = yielded[w, 0, MOTION_Y], yielded[w, 0, MOTION_Z]
-    right_y, right_z = yielded[w, 1, MOTION_Y], yielded[w, 1, MOTION_Z]
+    left_y, left_z = deflection[w, 0, MOTION_Y], deflection[w, 0, MOTION_Z]
+    right_y, right_z = deflection[w, 1, MOTION_Y], deflection[w, 1, MOTION_Z]
     sine, cosine = plane[w, SINE], plane[w, COSINE]
     y -= plane[w, MIDDLE_Y]
     z -= plane[w, MIDDLE_Z]
-    lean = (right_z - left_z) / rail_base
+    rail_roll = (right_z - left_z) / rail_base
     across = cosine * y + sine * z - 0.5 * (left_y + right_y)
     up = cosine * z - sine * y - 0.5 * (left_z + right_z)
-    return across + lean * up, roll - plane[w, ROLL] + plane[w, SLOPE_Z] * yaw - lean
+    return across + rail_roll * up, roll - plane[w, ROLL] + plane[w, SLOPE_Z] * yaw - rail_roll
 
 
 @compiled(in_loop=False)
-def recorded_against_rails(track, body, offset, height, states, yielded, plane, rail, found):
-    """`against_rails` of all wheelsets in recorded states.
+def write_positions_on_rails(track, body, offset, height, states, deflection, plane, rail, out):
+    """`position_on_rails` of all wheelsets in recorded states.
 
     Parameters
     ----------
@@ -216,26 +216,26 @@ def recorded_against_rails(track, body, offset, height, states, yielded, plane, 
     offset, height : float64[w]
         Of each wheelset from the reference body along the track and from the rail tops [m].
     states : float64[time, n_state]
-    yielded : float64[time, w, 2, 2]
+    deflection : float64[time, w, 2, 2]
         y and z by which each rail yields, in the axes of their plane [m].
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE]
         Scratch; the planes as those of smooth rails.
-    found : float64[time, w, 2]
+    out : float64[time, w, 2]
         Lateral displacement [m] and roll [rad] (output).
     """
     n = body.shape[0]
     cell, cell_u = np.zeros(n, dtype=np.int64), np.zeros(n)
     for i in range(states.shape[0]):
         for w in range(n if track.has_irregularity else 0):
-            k, u = cell_of(track, states[i, ARC_LENGTH] + offset[w])
+            k, u = track_cell(track, states[i, ARC_LENGTH] + offset[w])
             if k >= 0:
                 cell[w], cell_u[w] = k, u
         if track.has_irregularity:
-            locate_in_cells(track, cell, cell_u, plane, rail)
+            interpolate_rails(track, cell, cell_u, plane, rail)
         for w in range(n):
             b = 6 * body[w]
             y, z, roll = states[i, b + 1], states[i, b + 2] + height[w], states[i, b + 3]
             yaw = states[i, b + 5]
-            found[i, w, 0], found[i, w, 1] = against_rails(
-                plane, track.rail_base, w, y, z, roll, yaw, yielded[i]
+            out[i, w, 0], out[i, w, 1] = position_on_rails(
+                plane, track.rail_base, w, y, z, roll, yaw, deflection[i]
             )

@@ -78,8 +78,8 @@ class Record:
     def words(self) -> np.ndarray:
         """The record as compiled code reads it."""
         fields: Any = self
-        found = b"".join(map(_words, fields, self.compiled_type.fields.values()))
-        return np.frombuffer(bytearray(found), dtype=np.uint64)
+        words = b"".join(map(_words, fields, self.compiled_type.fields.values()))
+        return np.frombuffer(bytearray(words), dtype=np.uint64)
 
     @cached_property
     def address(self) -> int:
@@ -92,8 +92,8 @@ class Record:
 
 def record(kind: Class) -> Class:
     """Give a class of named tuples its address in memory."""
-    kept = ("__doc__", "__module__", "__annotations__")
-    body = {name: getattr(kind, name) for name in kept}
+    copied = ("__doc__", "__module__", "__annotations__")
+    body = {name: getattr(kind, name) for name in copied}
     return cast(Class, type(kind.__name__, (Record, kind), body))
 
 
@@ -160,13 +160,13 @@ def _attribute(context, builder, kind, address, name):
     field, first = kind.fields[name], kind.first[name]
 
     def place(word, of):
-        there = builder.gep(address, [context.get_constant(types.intp, 8 * word)])
-        return builder.bitcast(there, of.as_pointer())
+        pointer = builder.gep(address, [context.get_constant(types.intp, 8 * word)])
+        return builder.bitcast(pointer, of.as_pointer())
 
     def load(word, of):
-        found = builder.load(place(word, of), align=8)
-        found.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return found
+        value = builder.load(place(word, of), align=8)
+        value.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return value
 
     if isinstance(field, RecordType):
         return builder.gep(address, [context.get_constant(types.intp, 8 * first)])

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.controllers import ACTUATOR, actuator_output
-from railsim.kernels.element_outputs import element_outputs
+from railsim.kernels.controllers import ACTUATOR, write_actuator_output
+from railsim.kernels.element_outputs import write_element_outputs
 from railsim.kernels.rails import MOTION_Y, MOTION_Z
 from railsim.kernels.record import record
 from railsim.kernels.state import internal_begin
@@ -24,7 +24,7 @@ class Recorder(NamedTuple):
     wheel : float64[r, w, 2, WHEEL_COLUMNS]  see `contact_columns`
     rail : float64[r, w, 2, 2]        what a rail yields, y and z, see `rails`
     patch : float64[r, w, 2, 3, PATCH_ROWS]  contact patches, or of length 0
-    chosen : int64[e, 2]              elements to record, see `element_outputs`
+    selection : int64[e, 2]           elements to record, see `write_element_outputs`
     element : float64[r, e, ELEMENT_COLUMNS]
     """
 
@@ -34,7 +34,7 @@ class Recorder(NamedTuple):
     wheel: np.ndarray
     rail: np.ndarray
     patch: np.ndarray
-    chosen: np.ndarray
+    selection: np.ndarray
     element: np.ndarray
 
 
@@ -56,19 +56,19 @@ def record_row(recorder, row, system, state, derivative, work, n_patches):
             recorder.rail[row, w, side, 1] = work.rail_motion[w, side, MOTION_Z]
     if recorder.patch.shape[0] > 0:
         record_patches(recorder.patch, row, work, n_patches)
-    if recorder.chosen.shape[0] > 0:
+    if recorder.selection.shape[0] > 0:
         first = internal_begin(system.bodies.kind.shape[0])
-        element_outputs(
+        write_element_outputs(
             system,
             work,
             state[first : first + system.internal.kind.shape[0]],
-            recorder.chosen,
+            recorder.selection,
             recorder.element[row],
         )
-        for e in range(recorder.chosen.shape[0]):
-            if recorder.chosen[e, 0] == ACTUATOR:
-                actuator_output(
-                    system, work, state, recorder.chosen[e, 1], e, recorder.element[row]
+        for e in range(recorder.selection.shape[0]):
+            if recorder.selection[e, 0] == ACTUATOR:
+                write_actuator_output(
+                    system, work, state, recorder.selection[e, 1], e, recorder.element[row]
                 )
 
 

@@ -20,8 +20,8 @@ Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.actuators import actuator_forces
-from railsim.kernels.branches import rarely
+from railsim.kernels.actuators import add_actuator_forces
+from railsim.kernels.branches import unlikely
 from railsim.kernels.driving import (
     add_axle_torques,
     add_traction,
@@ -32,23 +32,23 @@ from railsim.kernels.driving import (
     turn_fixed,
 )
 from railsim.kernels.elements import (
-    AHEAD,
-    RATE_OF_STOPS,
-    friction_at_speed,
-    link_forces,
-    load_forces,
-    motion_of,
-    mount_forces,
+    HORIZON,
+    STOP_RATE,
+    add_link_forces,
+    add_load_forces,
+    add_mount_forces,
+    body_motion,
+    update_friction_limits,
 )
 from railsim.kernels.internal import internal_rate
 from railsim.kernels.lanes import (
     LANES,
     add_rows,
-    eight,
-    eight_of,
+    gather,
+    gather_from,
     load_rows,
-    spread,
-    starts,
+    row_starts,
+    splat,
     store_rows,
 )
 from railsim.kernels.rotation import sine_cosine_lanes
@@ -62,13 +62,13 @@ from railsim.kernels.state import (
 )
 from railsim.kernels.status import END_OF_TRACK, LAW_NOT_FINITE, RUNNING, STANDSTILL
 from railsim.kernels.support import (
-    AFTER_STEP,
-    AS_GIVEN,
+    CORRECT_RAILS,
+    KEEP_RAILS,
     SKIP,
-    evaluations,
-    locate_support,
-    settle_rates,
-    support_rates,
+    allowed_evaluations,
+    correct_massless_rates,
+    set_support_rates,
+    update_factors,
 )
 from railsim.kernels.support_step import correct_support
 from railsim.kernels.system import (
@@ -76,16 +76,16 @@ from railsim.kernels.system import (
     COS_ROLL,
     EVALUATIONS,
     FORCE,
+    FORCE_LINE,
     FREE,
     I_2,
-    LOCATED,
     MOMENT,
     POSE_SIZE,
-    PUSH,
+    RAILS_AT,
     RATES_SIZE,
     RELATIVE_SIZE,
     SIN_ROLL,
-    UNSETTLED,
+    UNSETTLED_RAILS,
     Y_0,
     Z_0,
 )
@@ -93,9 +93,9 @@ from railsim.kernels.track_frame import (
     ATTITUDE,
     FRAME_SIZE,
     OMEGA,
-    cell_of,
-    frame_columns,
-    track_frames,
+    load_frames,
+    set_frames,
+    track_cell,
 )
 from railsim.kernels.vectors import (
     add_at,
@@ -110,7 +110,7 @@ from railsim.kernels.vectors import (
     times,
     vector_at,
 )
-from railsim.kernels.wheel_rail import wheel_rail
+from railsim.kernels.wheel_rail import set_wheel_rail_forces
 
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 
@@ -119,15 +119,15 @@ STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
 
-    Origins and axes are those of frame `origin`, on the level (see `track_frames`): elements are
+    Origins and axes are those of frame `origin`, on the level (see `set_frames`): elements are
     stiff, and the round-off of coordinates counted from the start of the track would be forces of
     micronewtons; and the angles between the frames are small, which makes their sines cheap.
     """
     for f in range(offset.shape[0]):
-        cell[f], cell_u[f] = cell_of(track, s + offset[f])
-        if rarely(cell[f] < 0):
+        cell[f], cell_u[f] = track_cell(track, s + offset[f])
+        if unlikely(cell[f] < 0):
             return END_OF_TRACK
-    track_frames(track, cell, cell_u, origin, frames)
+    set_frames(track, cell, cell_u, origin, frames)
     return RUNNING
 
 
@@ -145,14 +145,14 @@ def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, omega):
 @compiled(inline=True)
 def store_motion(pose, offsets, R, X, V, omega):
     """Attitude, position, velocity and angular velocity of eight bodies; no force, no moment."""
-    zero = spread(0.0)
+    zero = splat(0.0)
     store_rows(pose, offsets, 0, R[:8])
     store_rows(pose, offsets, 8, (R[8], X[0], X[1], X[2], V[0], V[1], V[2], omega[0]))
     store_rows(pose, offsets, 16, (omega[1], omega[2], zero, zero, zero, zero, zero, zero))
 
 
 @compiled(python=False)
-def kinematics(system, work, state):
+def set_kinematics(system, work, state):
     """Poses and velocities of all bodies in global axes, rates of their coordinates.
 
     The latter (columns 3 to 5: roll, pitch, yaw) are in `Work.acceleration`, which keeps them
@@ -162,9 +162,9 @@ def kinematics(system, work, state):
     pose, rates, speed = work.pose, work.acceleration, state[SPEED]
     n = bodies.kind.shape[0]
     for first in range(0, bodies.whole.shape[0], LANES):
-        own = eight(bodies.whole, first)
-        x, y, z, roll, pitch, yaw = load_rows(state, starts(own, 6), 0, 6)
-        _, _, _, _, y_0, z_0, radius, spins = load_rows(bodies.row, starts(own, BODY_SIZE), 0, 8)
+        b = gather_from(bodies.whole, first)
+        x, y, z, roll, pitch, yaw = load_rows(state, row_starts(b, 6), 0, 6)
+        _, _, _, _, y_0, z_0, radius, spins = load_rows(bodies.row, row_starts(b, BODY_SIZE), 0, 8)
         sr, cr = sine_cosine_lanes(roll)
         sp, cp = sine_cosine_lanes(pitch * (1.0 - spins))
         sy, cy = sine_cosine_lanes(yaw)
@@ -180,43 +180,43 @@ def kinematics(system, work, state):
             sr,
             cr * cp,
         )
-        store_rows(relative, starts(own, RELATIVE_SIZE), 0, C[:8])
-        store_rows(relative, starts(own, RELATIVE_SIZE), 8, (C[8], sr, cr, sp, cp))
-        origin, A, turn, _ = frame_columns(frames, starts(eight_of(bodies.frame, own), FRAME_SIZE))
+        store_rows(relative, row_starts(b, RELATIVE_SIZE), 0, C[:8])
+        store_rows(relative, row_starts(b, RELATIVE_SIZE), 8, (C[8], sr, cr, sp, cp))
+        origin, A, turn, _ = load_frames(frames, row_starts(gather(bodies.frame, b), FRAME_SIZE))
         R = product(A, C)
         frame_omega = times(speed, turn)
-        vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), velocity_begin(n), 6)
-        turning = rotate_back(C, frame_omega)
-        r1, r2, r3 = euler_rates(sr, cr, sp, cp, minus((u1, u2, u3), turning))
+        vx, vy, vz, u1, u2, u3 = load_rows(state, row_starts(b, 6), velocity_begin(n), 6)
+        omega_f = rotate_back(C, frame_omega)
+        r1, r2, r3 = euler_rates(sr, cr, sp, cp, minus((u1, u2, u3), omega_f))
         # elements sit on the axleboxes, which do not spin
-        u2 = u2 + spins * (turning[1] + r3 * sr - u2)
-        store_rows(rates, starts(own, RATES_SIZE), 3, (r1, r2 + spins * (speed / radius), r3))
+        u2 = u2 + spins * (omega_f[1] + r3 * sr - u2)
+        store_rows(rates, row_starts(b, RATES_SIZE), 3, (r1, r2 + spins * (speed / radius), r3))
         r = x, y + y_0, z + z_0
         v = plus((speed + vx, vy, vz), cross(frame_omega, r))
         store_motion(
             pose,
-            starts(own, POSE_SIZE),
+            row_starts(b, POSE_SIZE),
             R,
             plus(origin, rotate(A, r)),
             rotate(A, v),
             rotate(R, (u1, u2, u3)),
         )
-    axlebox_kinematics(bodies, work, state)
+    set_axlebox_poses(bodies, work, state)
 
 
 @compiled(python=False)
-def axlebox_kinematics(bodies, work, state):
+def set_axlebox_poses(bodies, work, state):
     """Poses of the axleboxes: those of their wheelsets, turned by their own pitch."""
     pose, rates = work.pose, work.acceleration
     n = bodies.kind.shape[0]
     for first in range(0, bodies.axleboxes.shape[0], LANES):
-        own = eight(bodies.axleboxes, first)
-        carrier = starts(eight_of(bodies.parent, own), POSE_SIZE)
-        s, c = sine_cosine_lanes(load_rows(state, starts(own, 6), 4, 1)[0])
-        rate = load_rows(state, starts(own, 6), velocity_begin(n) + 4, 1)[0]
-        store_rows(rates, starts(own, RATES_SIZE), 4, (rate,))
-        R, X, V, omega = motion_of(pose, carrier)
-        turned = (
+        b = gather_from(bodies.axleboxes, first)
+        carrier = row_starts(gather(bodies.parent, b), POSE_SIZE)
+        s, c = sine_cosine_lanes(load_rows(state, row_starts(b, 6), 4, 1)[0])
+        rate = load_rows(state, row_starts(b, 6), velocity_begin(n) + 4, 1)[0]
+        store_rows(rates, row_starts(b, RATES_SIZE), 4, (rate,))
+        R, X, V, omega = body_motion(pose, carrier)
+        attitude = (
             c * R[0] - s * R[2],
             R[1],
             s * R[0] + c * R[2],
@@ -228,11 +228,11 @@ def axlebox_kinematics(bodies, work, state):
             s * R[6] + c * R[8],
         )
         omega = plus(omega, times(rate, (R[1], R[4], R[7])))
-        store_motion(pose, starts(own, POSE_SIZE), turned, X, V, omega)
+        store_motion(pose, row_starts(b, POSE_SIZE), attitude, X, V, omega)
 
 
 @compiled(python=False)
-def hold_axleboxes(system, work, state):
+def remove_axle_moments(system, work, state):
     """Take from the moments of elements on a wheelset what would turn it about its axle.
 
     Elements sit on the axleboxes, which do not spin: of their moment M in the axes C = Rz(yaw)
@@ -261,56 +261,54 @@ def hold_axleboxes(system, work, state):
 
 
 @compiled(python=False)
-def axlebox_dynamics(bodies, work, derivative):
+def set_axlebox_pitch(bodies, work, derivative):
     """Pitch accelerations of the axleboxes; all other forces and moments act on their wheelsets."""
     pose, rates = work.pose, work.acceleration
     n = bodies.kind.shape[0]
-    zero = spread(0.0)
+    zero = splat(0.0)
     count = bodies.axleboxes.shape[0]
     for first in range(0, count, LANES):
-        own = eight(bodies.axleboxes, first)
-        carrier = starts(eight_of(bodies.parent, own), POSE_SIZE)
-        inertia = load_rows(bodies.row, starts(own, BODY_SIZE), I_2, 1)[0]
-        f1, f2, f3, m1, m2, m3 = load_rows(pose, starts(own, POSE_SIZE), FORCE, 6)
+        b = gather_from(bodies.axleboxes, first)
+        carrier = row_starts(gather(bodies.parent, b), POSE_SIZE)
+        inertia = load_rows(bodies.row, row_starts(b, BODY_SIZE), I_2, 1)[0]
+        f1, f2, f3, m1, m2, m3 = load_rows(pose, row_starts(b, POSE_SIZE), FORCE, 6)
         _, r1, _, _, r4, _, _, r7 = load_rows(pose, carrier, 0, 8)
         axle = r1, r4, r7
         moment = dot((m1, m2, m3), axle)
         m1, m2, m3 = minus((m1, m2, m3), times(moment, axle))
-        add_rows(pose, carrier, PUSH, (zero, zero, f1, f2, f3, m1, m2, m3), count - first)
-        rate = load_rows(rates, starts(own, RATES_SIZE), 4, 1)[0]
-        turning = zero, zero, zero, zero, moment / inertia, zero
-        store_rows(derivative, starts(own, 6), 0, (zero, zero, zero, zero, rate, zero))
-        store_rows(derivative, starts(own, 6), velocity_begin(n), turning)
-        store_rows(rates, starts(own, RATES_SIZE), 0, turning)
+        add_rows(pose, carrier, FORCE_LINE, (zero, zero, f1, f2, f3, m1, m2, m3), count - first)
+        rate = load_rows(rates, row_starts(b, RATES_SIZE), 4, 1)[0]
+        accelerations = zero, zero, zero, zero, moment / inertia, zero
+        store_rows(derivative, row_starts(b, 6), 0, (zero, zero, zero, zero, rate, zero))
+        store_rows(derivative, row_starts(b, 6), velocity_begin(n), accelerations)
+        store_rows(rates, row_starts(b, RATES_SIZE), 0, accelerations)
 
 
 @compiled(python=False)
-def dynamics(system, work, state, derivative):
+def set_accelerations(system, work, state, derivative):
     """Accelerations of all bodies for V' = 0, and the rates of their coordinates.
 
     Leaves the absolute accelerations in body axes in `Work.acceleration`.
     """
     bodies, frames, relative, pose = system.bodies, work.frames, work.relative, work.pose
     rail_force, rates, speed = work.rail_force, work.acceleration, state[SPEED]
-    axlebox_dynamics(bodies, work, derivative)
+    set_axlebox_pitch(bodies, work, derivative)
     n = bodies.kind.shape[0]
     square, twice = speed * speed, 2.0 * speed
     for first in range(0, bodies.whole.shape[0], LANES):
-        own = eight(bodies.whole, first)
+        b = gather_from(bodies.whole, first)
         mass, i1, i2, i3, y_0, z_0, radius, spins = load_rows(
-            bodies.row, starts(own, BODY_SIZE), 0, 8
+            bodies.row, row_starts(b, BODY_SIZE), 0, 8
         )
-        vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), velocity_begin(n), 6)
-        roll_rate, pitch_rate, yaw_rate = load_rows(rates, starts(own, RATES_SIZE), 3, 3)
-        store_rows(derivative, starts(own, 6), 0, (vx, vy, vz, roll_rate, pitch_rate, yaw_rate))
-        _, A, omega, omega_s = frame_columns(
-            frames, starts(eight_of(bodies.frame, own), FRAME_SIZE)
+        vx, vy, vz, u1, u2, u3 = load_rows(state, row_starts(b, 6), velocity_begin(n), 6)
+        roll_rate, pitch_rate, yaw_rate = load_rows(rates, row_starts(b, RATES_SIZE), 3, 3)
+        store_rows(derivative, row_starts(b, 6), 0, (vx, vy, vz, roll_rate, pitch_rate, yaw_rate))
+        _, A, omega, omega_s = load_frames(frames, row_starts(gather(bodies.frame, b), FRAME_SIZE))
+        C = load_rows(relative, row_starts(b, RELATIVE_SIZE), 0, 8) + load_rows(
+            relative, row_starts(b, RELATIVE_SIZE), 8, 1
         )
-        C = load_rows(relative, starts(own, RELATIVE_SIZE), 0, 8) + load_rows(
-            relative, starts(own, RELATIVE_SIZE), 8, 1
-        )
-        fx, fy, fz, mx, my, mz = load_rows(pose, starts(own, POSE_SIZE), FORCE, 6)
-        px, py, pz, qx, qy, qz = load_rows(rail_force, starts(own, RATES_SIZE), 0, 6)
+        fx, fy, fz, mx, my, mz = load_rows(pose, row_starts(b, POSE_SIZE), FORCE, 6)
+        px, py, pz, qx, qy, qz = load_rows(rail_force, row_starts(b, RATES_SIZE), 0, 6)
         # force and moment in track axes, moment in body axes
         force = plus(rotate_back(A, (fx, fy, fz)), (px, py, pz))
         m = rotate_back(C, plus(rotate_back(A, (mx, my, mz)), (qx, qy, qz)))
@@ -326,23 +324,23 @@ def dynamics(system, work, state, derivative):
         d2 = (m[1] - u3 * h1 + u1 * h3) / i2
         d3 = (m[2] - u1 * h2 + o2 * h1) / i3
         b1, b2, b3 = rotate_back(C, a)
-        store_rows(rates, starts(own, RATES_SIZE), 0, (b1, b2, b3, d1, d2, d3))
+        store_rows(rates, row_starts(b, RATES_SIZE), 0, (b1, b2, b3, d1, d2, d3))
         # relative acceleration in the moving frame
-        x, y, z = load_rows(state, starts(own, 6), 0, 3)
+        x, y, z = load_rows(state, row_starts(b, 6), 0, 3)
         r = x, y + y_0, z + z_0
         centripetal = minus(times(dot(omega, r), omega), times(dot(omega, omega), r))
-        along = spread(0.0), omega[2], -omega[1]  # omega x e_x, of the frame's own acceleration
+        along = splat(0.0), omega[2], -omega[1]  # omega x e_x, of the frame's own acceleration
         moving = plus(plus(centripetal, along), cross(omega_s, r))
         ax, ay, az = minus(
             minus(a, times(square, moving)), times(twice, cross(omega, (vx, vy, vz)))
         )
-        store_rows(derivative, starts(own, 6), velocity_begin(n), (ax, ay, az, d1, d2, d3))
+        store_rows(derivative, row_starts(b, 6), velocity_begin(n), (ax, ay, az, d1, d2, d3))
 
 
 def right_hand_side(system, work, state, derivative):
     """Derivative of the whole state.
 
-    See `mechanics`, which leaves out the internal states of elements.
+    See `set_body_rates`, which leaves out the internal states of elements.
     """
     return right_hand_sides(system, work, state[None], derivative[None])
 
@@ -357,23 +355,23 @@ def right_hand_sides(system, work, states, derivatives):
     """
     status, where, n_patches = RUNNING, 0, 0
     for k in range(states.shape[0]):
-        status, where, n_patches = rates_of_state(system, work, states[k], derivatives[k])
+        status, where, n_patches = set_all_rates(system, work, states[k], derivatives[k])
         if status != RUNNING:
             break
     return status, where, n_patches
 
 
 @compiled(python=False)
-def rates_of_state(system, work, state, derivative):
+def set_all_rates(system, work, state, derivative):
     """As `right_hand_side`, within compiled code."""
-    status, where, n_patches = mechanics(system, work, state, derivative, AS_GIVEN)
-    internal_rates(system, work, state, derivative)
-    support_rates(system, work, state, derivative)
+    status, where, n_patches = set_body_rates(system, work, state, derivative, KEEP_RAILS)
+    set_internal_rates(system, work, state, derivative)
+    set_support_rates(system, work, state, derivative)
     return status, where, n_patches
 
 
 @compiled(python=False)
-def internal_rates(system, work, state, derivative):
+def set_internal_rates(system, work, state, derivative):
     """Derivative of the internal states of elements."""
     first = internal_begin(system.bodies.kind.shape[0])
     for i in range(system.internal.kind.shape[0]):
@@ -383,7 +381,7 @@ def internal_rates(system, work, state, derivative):
 
 
 @compiled(inline=True)
-def keep_counts(events, support_step, first, to):
+def copy_counts(events, support_step, first, to):
     """Copy the counts of patches: of repeated evaluations only the last one counts."""
     for w in range(events.shape[0]):
         if support_step.shape[0] > 0 and support_step[w, SKIP] > 0.0:
@@ -393,7 +391,7 @@ def keep_counts(events, support_step, first, to):
 
 
 @compiled(python=False)
-def mechanics(system, work, state, derivative, rails):
+def set_body_rates(system, work, state, derivative, rail_mode):
     """Derivative of coordinates, velocities, position and speed; drives of the internal states.
 
     Parameters
@@ -401,8 +399,8 @@ def mechanics(system, work, state, derivative, rails):
     system : System;  work : Work
     state, derivative : float64[n_state]
         See `railsim.kernels.state`; the velocities of fixed bodies in `state` are set.
-    rails : int
-        What becomes of elastic rails in `state`, see `support.AS_GIVEN`.
+    rail_mode : int
+        What becomes of elastic rails in `state`, see `support.KEEP_RAILS`.
 
     Returns
     -------
@@ -411,7 +409,7 @@ def mechanics(system, work, state, derivative, rails):
     bodies = system.bodies
     n = bodies.kind.shape[0]
     time, s, speed = state[TIME], state[ARC_LENGTH], state[SPEED]
-    if rarely(not speed > STANDSTILL_SPEED):
+    if unlikely(not speed > STANDSTILL_SPEED):
         return STANDSTILL, 0, 0
     status = locate_frames(
         system.track,
@@ -424,61 +422,61 @@ def mechanics(system, work, state, derivative, rails):
     )
     if status != RUNNING:
         return status, 0, 0
-    if rails != AFTER_STEP:
-        work.watch[LOCATED] = np.nan
+    if rail_mode != CORRECT_RAILS:
+        work.stepping[RAILS_AT] = np.nan
     if system.support.elastic:
-        locate_support(system, work, s)
-    if rarely(bodies.fixed.shape[0] > 0):
+        update_factors(system, work, s)
+    if unlikely(bodies.fixed.shape[0] > 0):
         turn_fixed(bodies, work.frames, state)
-    kinematics(system, work, state)
+    set_kinematics(system, work, state)
     m = system.internal.kind.shape[0]
-    inner = state[internal_begin(n) : smoothed_begin(n, m)]
-    work.laws[AHEAD], work.laws[RATE_OF_STOPS] = work.watch[0], 0.0
-    link_forces(system, work, inner)
-    if rarely(system.mounts.falling.shape[0] > 0):
-        friction_at_speed(system, work)
-    mount_forces(system, work, inner)
-    if rarely(system.actuators.body.shape[0] > 0):
-        where = actuator_forces(system, work, state, False)
+    internals = state[internal_begin(n) : smoothed_begin(n, m)]
+    work.laws[HORIZON], work.laws[STOP_RATE] = work.stepping[0], 0.0
+    add_link_forces(system, work, internals)
+    if unlikely(system.mounts.falling.shape[0] > 0):
+        update_friction_limits(system, work)
+    add_mount_forces(system, work, internals)
+    if unlikely(system.actuators.body.shape[0] > 0):
+        where = add_actuator_forces(system, work, state, False)
         if where >= 0:
             return LAW_NOT_FINITE, where, 0
-    hold_axleboxes(system, work, state)
-    if rarely(system.loads.body.shape[0] > 0):
-        load_forces(system, work, time, s)
-    if rarely(system.actuators.body.shape[0] > 0):
-        where = actuator_forces(system, work, state, True)
+    remove_axle_moments(system, work, state)
+    if unlikely(system.loads.body.shape[0] > 0):
+        add_load_forces(system, work, time, s)
+    if unlikely(system.actuators.body.shape[0] > 0):
+        where = add_actuator_forces(system, work, state, True)
         if where >= 0:
             return LAW_NOT_FINITE, where, 0
-    if rarely(system.drives.body.shape[0] > 0):
+    if unlikely(system.drives.body.shape[0] > 0):
         add_axle_torques(system, work, state)
-    if rarely(system.drive.mode == FREE):
+    if unlikely(system.drive.mode == FREE):
         add_traction(system, work, speed)
-    work.parts[EVALUATIONS] += 1
-    left = evaluations(system, state, rails)
-    as_given = left == 0
-    keep_counts(work.events, work.support_step, 0, 2)
+    work.counts[EVALUATIONS] += 1
+    remaining = allowed_evaluations(system, state, rail_mode)
+    single = remaining == 0
+    copy_counts(work.events, work.support_step, 0, 2)
     while True:  # one call only: it becomes part of this function
-        status, where, n_patches = wheel_rail(system, work, speed, state)
-        if as_given or status != RUNNING:
+        status, where, n_patches = set_wheel_rail_forces(system, work, speed, state)
+        if single or status != RUNNING:
             break
-        if rails == AFTER_STEP:
-            moved = correct_support(system, work, state, left)
+        if rail_mode == CORRECT_RAILS:
+            changed = correct_support(system, work, state, remaining)
         else:
-            moved = left > 0 and settle_rates(system, work, state)
-        if not moved:
+            changed = remaining > 0 and correct_massless_rates(system, work, state)
+        if not changed:
             break
-        left -= 1
-        if left == 0:
-            work.parts[UNSETTLED] += 1
-        keep_counts(work.events, work.support_step, 2, 0)
+        remaining -= 1
+        if remaining == 0:
+            work.counts[UNSETTLED_RAILS] += 1
+        copy_counts(work.events, work.support_step, 2, 0)
     if status != RUNNING:
         return status, where, n_patches
-    dynamics(system, work, state, derivative)
+    set_accelerations(system, work, state, derivative)
     rate = speed_change(system, work, state, derivative)
-    if rarely(rate != 0.0):
+    if unlikely(rate != 0.0):
         apply_speed_change(system, work, state, rate, derivative)
     hold_reference(bodies, work, derivative)
-    if rarely(bodies.fixed.shape[0] > 0):
+    if unlikely(bodies.fixed.shape[0] > 0):
         hold_fixed(bodies, work, speed, rate, derivative)
     derivative[TIME] = 1.0
     derivative[ARC_LENGTH] = speed

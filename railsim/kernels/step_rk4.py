@@ -3,43 +3,43 @@
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.branches import rarely
-from railsim.kernels.internal import MAXWELL_CURVE, PAD, hold_within, slides_together, within_table
-from railsim.kernels.rhs import internal_rates, mechanics
+from railsim.kernels.branches import unlikely
+from railsim.kernels.internal import MAXWELL_CURVE, PAD, ends_pad, limit_to_curve, return_to_limit
+from railsim.kernels.rhs import set_body_rates, set_internal_rates
 from railsim.kernels.state import LAST_STEP, internal_begin
 from railsim.kernels.status import NOT_FINITE, RUNNING
-from railsim.kernels.support import BALANCED, support_rates
-from railsim.kernels.transient import creepage_rates, keep_creepages
+from railsim.kernels.support import BALANCE_RATES, set_support_rates
+from railsim.kernels.transient import set_creepage_rates, store_creepages
 
 
 @compiled(python=False)
-def all_rates(system, work, state, derivative):
+def set_balanced_rates(system, work, state, derivative):
     """Derivative of the whole state, of massless rails with the rates that balance the forces.
 
     Returns
     -------
     status, wheelset, n_patches : int
     """
-    status, where, n_patches = mechanics(system, work, state, derivative, BALANCED)
+    status, where, n_patches = set_body_rates(system, work, state, derivative, BALANCE_RATES)
     if status == RUNNING:
-        internal_rates(system, work, state, derivative)
-        support_rates(system, work, state, derivative)
+        set_internal_rates(system, work, state, derivative)
+        set_support_rates(system, work, state, derivative)
         if system.contact.transient != 0:
-            creepage_rates(system, work, state, derivative)
+            set_creepage_rates(system, work, state, derivative)
     return status, where, n_patches
 
 
 @compiled
-def settle_limits(internal, curves, first, drive, state):
+def restore_limits(internal, curves, first, drive, state):
     """Bring the forces of friction pads and of tables that end flat back within their limits."""
     for i in range(internal.kind.shape[0]):
         k = first + i
-        if slides_together(internal, i):
-            hold_within(internal, i, first, drive, state)
+        if ends_pad(internal, i):
+            return_to_limit(internal, i, first, drive, state)
         elif internal.kind[i] == PAD and internal.parameter[i, 1] == 0.0:
             state[k] = min(drive[i, 1], max(-drive[i, 1], state[k]))
         elif internal.kind[i] == MAXWELL_CURVE:
-            state[k] = within_table(curves, internal.curve[i], state[k])
+            state[k] = limit_to_curve(curves, internal.curve[i], state[k])
 
 
 @compiled(python=False)
@@ -48,7 +48,7 @@ def first_not_finite(state):
     total = 0.0
     for k in range(state.shape[0]):
         total += 0.0 * state[k]
-    if not rarely(total != 0.0):
+    if not unlikely(total != 0.0):
         return -1
     for k in range(state.shape[0]):
         if not np.isfinite(state[k]):
@@ -61,7 +61,7 @@ def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
     total, trial, rate = stages[0], stages[1], stages[2]
     if system.contact.transient != 0:
-        keep_creepages(system, work, state)
+        store_creepages(system, work, state)
         state[LAST_STEP] = 0.0
     for k in range(state.shape[0]):
         total[k] = derivative[k]
@@ -70,18 +70,18 @@ def step_rk4(system, work, state, derivative, stages, h):
         fraction = 0.5 * h if stage < 3 else h
         for k in range(state.shape[0]):
             trial[k] = state[k] + fraction * rate[k]
-        status, where, _ = all_rates(system, work, trial, rate)
+        status, where, _ = set_balanced_rates(system, work, trial, rate)
         if status != RUNNING:
             # look-ups take what is not finite for a wheel beyond its table
-            bad = first_not_finite(trial)
-            if bad >= 0:
-                return NOT_FINITE, bad
+            entry = first_not_finite(trial)
+            if entry >= 0:
+                return NOT_FINITE, entry
             return status, where
         weight = 2.0 if stage < 3 else 1.0
         for k in range(state.shape[0]):
             total[k] += weight * rate[k]
     for k in range(state.shape[0]):
         state[k] += h / 6.0 * total[k]
-    inner = internal_begin(system.bodies.kind.shape[0])
-    settle_limits(system.internal, system.curves, inner, work.drive, state)
+    first = internal_begin(system.bodies.kind.shape[0])
+    restore_limits(system.internal, system.curves, first, work.drive, state)
     return RUNNING, 0

@@ -11,7 +11,7 @@ between sleeper and ground
 The contact sees wheel minus rail: displacement u beside the rail's irregularity, and the rate u' as
 a velocity of the rail's *material*, so that it counts in the creepage (an irregularity's slope does
 not).  Rail heads shift and do not turn.  Without masses M = 0, and the equation is one of order
-one for u, in which u' is also the slip: `settle_rates` solves for it.
+one for u, in which u' is also the slip: `correct_massless_rates` solves for it.
 
 How the fast scheme advances it: `support_step`.
 
@@ -22,20 +22,20 @@ chapter 6; Popp and Schiehlen (2003), System Dynamics and Long-Term Behaviour.
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.branches import rarely
+from railsim.kernels.branches import unlikely
 from railsim.kernels.contact_columns import W_Q, WHEEL_COLUMNS
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.lanes import (
     any_beyond,
-    beside,
-    eight_in_pairs,
-    larger,
     load_lanes,
     load_rows,
+    maximum,
     pair_starts,
-    spread,
-    starts,
+    paired_numbers,
+    row_starts,
+    splat,
     store_rows,
+    swap_pairs,
     where_beyond,
 )
 from railsim.kernels.rails import MOTION_Y, MOTION_Y_RATE, MOTION_Z, MOTION_Z_RATE, PAIRS, SIDES
@@ -44,30 +44,30 @@ from railsim.kernels.state import LAST_STEP, contact_begin
 # columns of a wheelset's track in the state: u, u', r_0, s_0, u''
 RAIL_DOF, DOF = 4, 7
 RATE, MEAN_RATE, MEAN_CHANGE, ACCELERATION = DOF, 2 * DOF, 3 * DOF, 4 * DOF
-# then what the slopes of contact forces have learnt at each wheel, see `learning`: what is added
-# to those of Y and Q over y; y of the last step; error of the forces foreseen where the rails have
-# moved for it already; set of the patches, in bits
-LEARNT = 5 * DOF
-L_Y_Y, L_Z_Y, L_WAY, L_ERROR_Y, L_ERROR_Z, L_PATCHES = range(6)
-LEARNT_SIZE = 6
+# then the adaptation of the slopes of contact forces at each wheel (least mean squares), see
+# `slope_adaptation`: what is added to those of Y and Q over y; y of the last step; error of the
+# forces predicted where the rails have moved for it already; set of the patches, in bits
+LMS = 5 * DOF
+L_Y_Y, L_Z_Y, L_MOTION, L_ERROR_Y, L_ERROR_Z, L_PATCHES = range(6)
+LMS_SIZE = 6
 # and the weight of the mean rate before the last step, g in `support_step`
-WEIGHT = LEARNT + 2 * LEARNT_SIZE
-SUPPORT_SIZE = WEIGHT + 1
+STEP_RATIO = LMS + 2 * LMS_SIZE
+SUPPORT_SIZE = STEP_RATIO + 1
 # entries of a patch and of a wheelset's patches in the state before them, see `transient`
 PATCH_STATE = 7
 TRACED = 2 * N_PATCH  # patches of a wheel that are followed, of two rails side by side
 TRANSIENT_SIZE = 2 * TRACED * PATCH_STATE
 # what an evaluation does to the rails: nothing; settles them after a step of the fast scheme, see
-# `correct_support`; finds the rates of a massless track, see `settle_rates`
+# `correct_support`; finds the rates of a massless track, see `correct_massless_rates`
 # integers of numpy: a function called with literals of Python is compiled for each value
-AS_GIVEN, AFTER_STEP, BALANCED = map(np.int64, range(3))
-# share of the static wheel load by which forces may differ from those foreseen; imbalance of a
+KEEP_RAILS, CORRECT_RAILS, BALANCE_RATES = map(np.int64, range(3))
+# share of the static wheel load by which forces may differ from those predicted; imbalance of a
 # massless track (N, N m); evaluations allowed for either
-SETTLED, BALANCE = 2e-4, 1e-2
+FORCE_TOLERANCE, RATE_TOLERANCE = 2e-4, 1e-2
 # share of the static wheel load, lateral and vertical, up to which the forces' slopes say how the
 # forces change as the rails are corrected; beyond it the contact is evaluated again
-BY_SLOPES_Y, BY_SLOPES_Z = 4e-3, 2e-2
-MOST_CORRECTIONS, MOST_BALANCES = 10, 50
+SLOPE_RANGE_Y, SLOPE_RANGE_Z = 4e-3, 2e-2
+MAX_CORRECTIONS, MAX_BALANCES = 10, 50
 
 # entries of Support.row: masses, then stiffness and damping of pads and ballast in y, z and roll
 (
@@ -96,7 +96,7 @@ Y_Y, Y_Z, Z_Y, Z_Z = 0, 1, 3, 4  # entries of such a matrix
 D_Y_SLIP, D_Z_SLIP = 14, 15
 # position of the contact from the wheelset's centre times its stiffness, and that stiffness
 FOOT_Y_STIFFNESS, FOOT_Z_STIFFNESS, STIFFNESS = 16, 17, 18
-# set of the patches that carry, in bits; errors of the forces foreseen
+# set of the patches that carry, in bits; errors of the forces predicted
 PATCHES, ERROR_Y, ERROR_Z = 19, 20, 21
 SUPPORT_COLUMNS = 24  # whole cache lines
 # columns of Work.support_step[w]: 0 to 6 right-hand sides and solution, then the factors of pads
@@ -104,11 +104,11 @@ SUPPORT_COLUMNS = 24  # whole cache lines
 PADS, BALLAST = DOF, DOF + 1
 # imbalance of the rails one correction ago, what corrections are multiplied by, and whether one
 # is left to the next step
-BEFORE, RELAXATION, PENDING = DOF + 2, DOF + 6, DOF + 8
+LAST_IMBALANCE, RELAXATION, PENDING = DOF + 2, DOF + 6, DOF + 8
 # whether its contact is not to be evaluated again
 SKIP = DOF + 9
 # whether its rails move at once
-MOVED = DOF + 10
+URGENT = DOF + 10
 # heights of wheels that are not round, left and right, and their rates
 HEIGHTS = DOF + 11
 SUPPORT_STEP = 24  # whole cache lines
@@ -117,7 +117,7 @@ REFERENCE_MASS = 100.0
 
 
 @compiled
-def factors(variation, s, out):
+def set_factors(variation, s, out):
     """Factors of pads and ballast at arc length `s` into ``out[PADS]``, ``out[BALLAST]``."""
     last = variation.shape[0] - 1
     if s <= variation[0, 0] or last == 0:
@@ -135,7 +135,7 @@ def factors(variation, s, out):
 
 
 @compiled(python=False)
-def locate_support(system, work, s):
+def update_factors(system, work, s):
     """Factors of stiffness and damping under each wheelset, the reference body being at `s`.
 
     No correction of the rails waits in an evaluation that has only begun.
@@ -145,9 +145,9 @@ def locate_support(system, work, s):
         work.support_step[w, SKIP] = 0.0
         work.support_step[w, PADS] = 1.0
         work.support_step[w, BALLAST] = 1.0
-        if rarely(system.support.variation.shape[0] > 0):
+        if unlikely(system.support.variation.shape[0] > 0):
             f = system.bodies.frame[system.contact.body[w]]
-            factors(system.support.variation, s + system.frame_offset[f], work.support_step[w])
+            set_factors(system.support.variation, s + system.frame_offset[f], work.support_step[w])
 
 
 @compiled(inline=True)
@@ -164,7 +164,7 @@ def store_track(state, rails, sleepers, first, values):
 
 
 @compiled(inline=True)
-def track_rows(system, wheels):
+def track_offsets(system, wheels):
     """Where rails and sleepers of eight wheels begin in the state."""
     first = support_begin(system)
     return (
@@ -187,21 +187,21 @@ def track_forces(support, factors, u, rate, g):
     z = z - row[K_PAD_Z] * (u[1] - u[3] - arm * u[4])
     y, z = pads * y, pads * z
     if not support.sleeper:
-        zero = spread(0.0)
+        zero = splat(0.0)
         return y, z, zero, zero, zero
     roll = arm * z
     return (
         y,
         z,
-        ballast * (g * row[C_BALLAST_Y] * rate[2] - row[K_BALLAST_Y] * u[2]) - (y + beside(y)),
-        ballast * (g * row[C_BALLAST_Z] * rate[3] - row[K_BALLAST_Z] * u[3]) - (z + beside(z)),
+        ballast * (g * row[C_BALLAST_Y] * rate[2] - row[K_BALLAST_Y] * u[2]) - (y + swap_pairs(y)),
+        ballast * (g * row[C_BALLAST_Z] * rate[3] - row[K_BALLAST_Z] * u[3]) - (z + swap_pairs(z)),
         ballast * (g * row[C_BALLAST_ROLL] * rate[4] - row[K_BALLAST_ROLL] * u[4])
-        - (roll + beside(roll)),
+        - (roll + swap_pairs(roll)),
     )
 
 
 @compiled(inline=True)
-def product(matrix, y, z, roll):
+def contact_force(matrix, y, z, roll):
     """Matrix K or D of a contact times a motion of the wheel against the rail: forces (Y, Q)."""
     return (
         matrix[0] * y + matrix[1] * z + matrix[2] * roll,
@@ -238,25 +238,25 @@ def solve_track(support, factors, K, D, b, m, c, k):
     inverse = 1.0 / (p * t - q * r)
     x_y, x_z = inverse * (t * b[0] - q * b[1]), inverse * (p * b[1] - r * b[0])
     if not support.sleeper:
-        zero = spread(0.0)
+        zero = splat(0.0)
         return x_y, x_z, zero, zero, zero
-    own = m * row[M_SLEEPER]
+    sleeper = m * row[M_SLEEPER]
     # pad and contact in series
     yy, yz = a_y - a_y * a_y * t * inverse, a_y * a_z * q * inverse
     zy, zz = a_y * a_z * r * inverse, a_z - a_z * a_z * p * inverse
     yr, zr, ry = arm * yz, arm * zz, arm * zy
     b_y, b_z, b_r = a_y * x_y, a_z * x_z, arm * a_z * x_z
     b_y, b_z, b_r = (
-        b[2] + (b_y + beside(b_y)),
-        b[3] + (b_z + beside(b_z)),
-        b[4] + (b_r + beside(b_r)),
+        b[2] + (b_y + swap_pairs(b_y)),
+        b[3] + (b_z + swap_pairs(b_z)),
+        b[4] + (b_r + swap_pairs(b_r)),
     )
     s_rr = m * row[I_SLEEPER] + ballast * (c * row[C_BALLAST_ROLL] + k * row[K_BALLAST_ROLL])
-    s_rr = s_rr + base * base * (zz + beside(zz))
-    s_yy = own + ballast * (c * row[C_BALLAST_Y] + k * row[K_BALLAST_Y]) + (yy + beside(yy))
-    s_zz = own + ballast * (c * row[C_BALLAST_Z] + k * row[K_BALLAST_Z]) + (zz + beside(zz))
-    s_yz, s_zy, s_yr = yz + beside(yz), zy + beside(zy), yr + beside(yr)
-    s_zr, s_ry = zr + beside(zr), ry + beside(ry)
+    s_rr = s_rr + base * base * (zz + swap_pairs(zz))
+    s_yy = sleeper + ballast * (c * row[C_BALLAST_Y] + k * row[K_BALLAST_Y]) + (yy + swap_pairs(yy))
+    s_zz = sleeper + ballast * (c * row[C_BALLAST_Z] + k * row[K_BALLAST_Z]) + (zz + swap_pairs(zz))
+    s_yz, s_zy, s_yr = yz + swap_pairs(yz), zy + swap_pairs(zy), yr + swap_pairs(yr)
+    s_zr, s_ry = zr + swap_pairs(zr), ry + swap_pairs(ry)
     # the matrix is far from singular: ballast on its diagonal
     f = s_zy / s_yy
     s_rz = s_zr
@@ -280,7 +280,7 @@ def mass_of(row, k):
 
 
 @compiled(inline=True)
-def weighed(row, x):
+def inertia(row, x):
     """Masses times accelerations of rails and sleepers."""
     return (
         row[M_RAIL] * x[0],
@@ -294,11 +294,11 @@ def weighed(row, x):
 @compiled(inline=True)
 def imbalance(system, work, state, wheels):
     """F - C u' - K u of the tracks under eight wheels, as `load_track` gives displacements."""
-    rails, sleepers = track_rows(system, wheels)
+    rails, sleepers = track_offsets(system, wheels)
     factors = load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), PADS, 2)
     u, rate = load_track(state, rails, sleepers, 0), load_track(state, rails, sleepers, RATE)
     y, z, s_y, s_z, s_r = track_forces(system.support, factors, u, rate, -1.0)
-    f_y, f_z = load_rows(work.support, starts(wheels, SUPPORT_COLUMNS), F_Y, 2)
+    f_y, f_z = load_rows(work.support, row_starts(wheels, SUPPORT_COLUMNS), F_Y, 2)
     return f_y + y, f_z + z, s_y, s_z, s_r
 
 
@@ -316,19 +316,19 @@ def support_begin(system):
 
 
 @compiled(python=False)
-def support_rates(system, work, state, derivative):
+def set_support_rates(system, work, state, derivative):
     """Rates of the track's displacements and of their rates.
 
     Of a massless track the latter is the imbalance of forces over `REFERENCE_MASS`, zero once
-    `settle_rates` has found the rates.
+    `correct_massless_rates` has found the rates.
     """
     support = system.support
     if not support.elastic:
         return
     row, count = support.row, work.support.shape[0]
     for first in range(0, count, PAIRS):
-        wheels = eight_in_pairs(first, count)
-        rails, sleepers = track_rows(system, wheels)
+        wheels = paired_numbers(first, count)
+        rails, sleepers = track_offsets(system, wheels)
         store_track(derivative, rails, sleepers, RATE, imbalance(system, work, state, wheels))
     for w in range(count):
         first = support_begin(system) + SUPPORT_SIZE * w
@@ -340,58 +340,58 @@ def support_rates(system, work, state, derivative):
 
 
 @compiled(python=False)
-def settle_rates(system, work, state):
+def correct_massless_rates(system, work, state):
     """One Newton step for the rates of a massless track, with the forces just evaluated.
 
     The slopes are those of `Work.support`, an estimate for the creep forces.  A wheelset whose
-    forces balance to `BALANCE` is not changed: it does not depend on the others.
+    forces balance to `RATE_TOLERANCE` is not changed: it does not depend on the others.
 
     Returns
     -------
     bool : whether rates changed, so that the forces are to be evaluated again.
     """
     changed, count = False, work.support.shape[0]
-    zero, one = spread(0.0), spread(1.0)
+    zero, one = splat(0.0), splat(1.0)
     for first in range(0, count, PAIRS):
-        wheels = eight_in_pairs(first, count)
-        rails, sleepers = track_rows(system, wheels)
+        wheels = paired_numbers(first, count)
+        rails, sleepers = track_offsets(system, wheels)
         b = imbalance(system, work, state, wheels)
-        much = larger(b[0] * b[0], b[1] * b[1])
-        much = larger(larger(much, beside(much)), larger(b[2] * b[2], b[3] * b[3]))
-        much = larger(much, b[4] * b[4])
-        if not any_beyond(much, BALANCE * BALANCE):
+        largest = maximum(b[0] * b[0], b[1] * b[1])
+        largest = maximum(maximum(largest, swap_pairs(largest)), maximum(b[2] * b[2], b[3] * b[3]))
+        largest = maximum(largest, b[4] * b[4])
+        if not any_beyond(largest, RATE_TOLERANCE * RATE_TOLERANCE):
             continue
         changed = True
-        much = where_beyond(much, BALANCE * BALANCE, one, zero)
+        largest = where_beyond(largest, RATE_TOLERANCE * RATE_TOLERANCE, one, zero)
         x = solve_track(
             system.support,
             load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), PADS, 2),
-            load_rows(work.support, starts(wheels, SUPPORT_COLUMNS), K, 6),
-            load_rows(work.support, starts(wheels, SUPPORT_COLUMNS), D, 6),
+            load_rows(work.support, row_starts(wheels, SUPPORT_COLUMNS), K, 6),
+            load_rows(work.support, row_starts(wheels, SUPPORT_COLUMNS), D, 6),
             b,
             0.0,
             1.0,
             0.0,
         )
         u = load_track(state, rails, sleepers, RATE)
-        store_track(state, rails, sleepers, RATE, plus_part(u, much, x))
+        store_track(state, rails, sleepers, RATE, plus_scaled(u, largest, x))
     return changed
 
 
 @compiled(inline=True)
-def plus_part(u, part, x):
+def plus_scaled(u, factor, x):
     """Five Lanes u plus a part of five others."""
     return (
-        u[0] + part * x[0],
-        u[1] + part * x[1],
-        u[2] + part * x[2],
-        u[3] + part * x[3],
-        u[4] + part * x[4],
+        u[0] + factor * x[0],
+        u[1] + factor * x[1],
+        u[2] + factor * x[2],
+        u[3] + factor * x[3],
+        u[4] + factor * x[4],
     )
 
 
 @compiled(python=False)
-def rail_motions(system, work, state):
+def set_rail_motions(system, work, state):
     """Displacements and velocities of the rails for `rails`."""
     for w in range(work.support.shape[0]):
         first = support_begin(system) + SUPPORT_SIZE * w
@@ -404,26 +404,26 @@ def rail_motions(system, work, state):
 
 
 @compiled(python=False)
-def complete_slopes(system, work, state):
-    """Forces on the rails, and what their slopes have learnt at the same set of patches."""
-    count, begin = work.support.shape[0], support_begin(system) + LEARNT
-    zero, one = spread(0.0), spread(1.0)
+def add_lms_slopes(system, work, state):
+    """Forces on the rails; add to their slopes the adaptation made at the same set of patches."""
+    count, begin = work.support.shape[0], support_begin(system) + LMS
+    zero, one = splat(0.0), splat(1.0)
     for first in range(0, count, PAIRS):
-        wheels = eight_in_pairs(first, count)
-        own = starts(wheels, SUPPORT_COLUMNS)
-        y_y, z_y, _, _, _, learnt = load_rows(
-            state, pair_starts(wheels, begin, SUPPORT_SIZE, LEARNT_SIZE), 0, LEARNT_SIZE
+        wheels = paired_numbers(first, count)
+        rows = row_starts(wheels, SUPPORT_COLUMNS)
+        y_y, z_y, _, _, _, patches_0 = load_rows(
+            state, pair_starts(wheels, begin, SUPPORT_SIZE, LMS_SIZE), 0, LMS_SIZE
         )
-        patches = load_rows(work.support, own, PATCHES, 1)[0]
+        patches = load_rows(work.support, rows, PATCHES, 1)[0]
         skip = load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), SKIP, 1)[0]
-        _, _, k0, k1, k2, k3, k4, k5 = load_rows(work.support, own, 0, 8)
-        Q, Y = load_rows(work.wheel, starts(wheels, WHEEL_COLUMNS), W_Q, 2)
-        take = where_beyond(patches - learnt, 0.0, zero, one - skip)
-        store_rows(work.support, own, 0, (Y, Q, k0 + take * y_y, k1, k2, k3 + take * z_y, k4, k5))
+        _, _, k0, k1, k2, k3, k4, k5 = load_rows(work.support, rows, 0, 8)
+        Q, Y = load_rows(work.wheel, row_starts(wheels, WHEEL_COLUMNS), W_Q, 2)
+        take = where_beyond(patches - patches_0, 0.0, zero, one - skip)
+        store_rows(work.support, rows, 0, (Y, Q, k0 + take * y_y, k1, k2, k3 + take * z_y, k4, k5))
 
 
 @compiled(python=False)
-def step_compliance(system, work, state):
+def set_compliance(system, work, state):
     """Velocity that a force at the contact adds to a rail after the last step, see `step_support`.
 
     From (M c^2/h + c C + h K) r = F and u' = c r, c = 1 + g: 1/(c m/h + C + h K/c) of the rail on
@@ -435,7 +435,7 @@ def step_compliance(system, work, state):
     if h == 0.0:
         out[0] = out[1] = out[2] = 0.0
         return
-    lag = h / (1.0 + state[support_begin(system) + WEIGHT])
+    lag = h / (1.0 + state[support_begin(system) + STEP_RATIO])
     mass, sleeper = row[M_RAIL] / lag, row[M_SLEEPER] / lag
     out[0] = 1.0 / (mass + row[C_PAD_Y] + lag * row[K_PAD_Y])
     out[1] = 1.0 / (mass + row[C_PAD_Z] + lag * row[K_PAD_Z])
@@ -446,10 +446,10 @@ def step_compliance(system, work, state):
 
 
 @compiled(python=False)
-def evaluations(system, state, rails):
-    """How often the contact forces may be evaluated again for the rails: `rails` as `AS_GIVEN`."""
-    if rails == AFTER_STEP and system.support.elastic and state[LAST_STEP] > 0.0:
-        return MOST_CORRECTIONS  # a step has been taken
-    if rails == BALANCED and system.support.elastic and system.support.massless:
-        return MOST_BALANCES
+def allowed_evaluations(system, state, rail_mode):
+    """How often contact forces may be evaluated again for the rails, by `rail_mode`."""
+    if rail_mode == CORRECT_RAILS and system.support.elastic and state[LAST_STEP] > 0.0:
+        return MAX_CORRECTIONS  # a step has been taken
+    if rail_mode == BALANCE_RATES and system.support.elastic and system.support.massless:
+        return MAX_BALANCES
     return 0

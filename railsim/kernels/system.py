@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels.commands import Actuators, Controllers, Own, Signals
 from railsim.kernels.contact_table import RailTables
+from railsim.kernels.control_records import Actuators, Controllers, Signals, UserLaws
 from railsim.kernels.element_columns import LINK_COLUMNS, MOUNT_COLUMNS
 from railsim.kernels.internal import Internal
 from railsim.kernels.patches import CreepLaw, CreepScratch
@@ -32,30 +32,30 @@ BRAKES, OVER_DISTANCE, SLIP_BEGIN, SLIP_END = range(4)
 POSITION, VELOCITY, ANGULAR, FORCE, MOMENT = 9, 12, 15, 18, 21
 # Forces are added by whole cache lines, the last two columns of the angular velocity with them: a
 # part of a line that was just written is read again only after a delay.
-PUSH = 16
+FORCE_LINE = 16
 POSE_SIZE = 24
 # columns of Work.relative: attitude C (0 to 8), sines and cosines
 SIN_ROLL, COS_ROLL, SIN_PITCH, COS_PITCH = range(9, 13)
 RELATIVE_SIZE = 16
 RATES_SIZE = 8  # of Work.acceleration and Work.rail_force
-# Work.parts: most parts of a step in which a wheel lifts or strikes, 0 where that is not looked
+# Work.counts: most parts of a step in which a wheel lifts or strikes, 0 where that is not looked
 # for; so far: divided steps, evaluations whose elastic rails did not settle, steps, evaluations;
 # 1 where patches are recorded, so that no wheelset may be left out of an evaluation
-PARTS, DIVIDED, UNSETTLED, STEPS, EVALUATIONS, WHOLE = range(6)
-N_PARTS = 6
-# Work.watch: time for which contact forces are foreseen [s]; share of the static wheel load by
+MAX_PARTS, DIVIDED_STEPS, UNSETTLED_RAILS, STEPS, EVALUATIONS, ALL_WHEELS = range(6)
+N_COUNTS = 6
+# Work.stepping: time for which contact forces are predicted [s]; share of the static wheel load by
 # which they may change in a step, and what a change of the lateral force counts against that of
 # the vertical one; shortest step that has the full tolerance of forces on elastic rails [s]; arc
 # length at which the rails of `Work.plane` and `Work.rail` are [m], no number where that is open;
 # share of the wheel load by which they may change in a part of a step; time in which the stiffness
 # of a contact on rigid rails counts as damping, over the last step, see `model.time_step`; what a
 # change counts near rails whose section changes
-AHEAD, SHARE, SIDEWAYS, WHOLE_TOLERANCE, LOCATED, PER_PART, IMPLICIT, AT_SECTIONS = range(8)
-N_WATCH = 8
+HORIZON, SHARE, LATERAL, TOLERANCE_STEP, RAILS_AT, PART_SHARE, IMPLICIT, SECTIONS = range(8)
+N_STEPPING = 8
 # Work.events, of each wheelset: loaded patches so far, how many of them were outside the range of
 # the creep law; the same kept over corrections; look-ups beyond the yaw of the contact table;
 # evaluations of its contact alone
-AGAIN = 5
+REPEATS = 5
 N_EVENTS = 6
 
 
@@ -132,7 +132,7 @@ class Contact(NamedTuple):
     check_wheel : float64[w, c, CHECK_WHEEL]   check rails, see `check_rails`
     transient : int              1 where creep forces follow the creepages, see `transient`
     friction_law : int           address of a law of one's own for it, else 0
-    friction_block : float64[...]   its block, see `own_laws`
+    friction_block : float64[...]   its block, see `user_laws`
     """
 
     body: np.ndarray
@@ -213,7 +213,7 @@ class Mounts(NamedTuple):
     curve : int64[e, 3]          tables of force over deflection, else -1
     flags : int64[e, 4]          1 if: translational part, axes of both bodies (shear), rotational
                                  part, friction pads (`ONE_SIDED` where they may lift)
-    law : int64[l, 3]            see `mount_laws`
+    law : int64[l, 3]            see `nonlinear_axes`
     falling : int64[f]           mounts whose friction falls with the sliding speed
     """
 
@@ -372,7 +372,7 @@ class System(NamedTuple):
     actuators: Actuators
     signals: Signals
     controllers: Controllers
-    own: Own
+    user_laws: UserLaws
 
 
 @record
@@ -389,15 +389,15 @@ class Work(NamedTuple):
     rail_force : float64[n, 6]  contact force and moment on a wheelset, track axes
     acceleration : float64[n, 6]  absolute, in body axes
     drive : float64[m, 2]       what drives each internal state, and its limit
-    friction : float64[e, 3, 2]  limits of the pads of mounts, see `elements.friction_at_speed`
+    friction : float64[e, 3, 2]  limits of the pads of mounts, see `elements.update_friction_limits`
     laws : float64[LAWS_SIZE]   of the elements at hand, see `elements`
-    decay : float64[m]          see `internal.constant_decays`
+    decay : float64[m]          see `internal.set_decays`
     contact_jacobian : float64[n, CONTACT_JACOBIAN]  see `wheel_rail`
-    coupled : float64[5, 8]     see `step_fast.soften_coupled`
+    slip_matrix : float64[5, 8] see `step_fast.damp_coupled`
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE];
     rail_motion : float64[w, 2, MOTION_SIZE]   the rails under each wheelset, see `rails`
     rail_cell : int64[w];  rail_u : float64[w]   where in the track's tables they are
-    above : float64[10]         the wheelset at hand in the plane of its rails: y, z, roll, yaw,
+    wheelset : float64[10]      the wheelset at hand in the plane of its rails: y, z, roll, yaw,
                                 their rates, stretched roll and slope, see `wheel_rail`
     look_up, weights, stiffness, approach : of the wheel at hand, see `contact_table`
     patch_index : int64[p, 3]   wheelset, side and patch of each active contact patch
@@ -408,21 +408,21 @@ class Work(NamedTuple):
                                 of each wheelset's track, see `support`; w = 0 on rigid rails
     motion : float64[w, 2, LANES]   motion of the wheelsets before a step, see `support_step`
     compliance : float64[3]     of a rail over the last step [m/(N s), m/(N s), s], see
-                                `support.step_compliance`
+                                `support.set_compliance`
     vibration : float64[w, 2, VIBRATION]  of each wheel load, see `vibration`
     events : int64[w, N_EVENTS]   see there
     force_rate : float64[w]     largest rate of the contact forces of each wheelset, and of stops
                                 between bodies [N/s]
-    watch : float64[N_WATCH]    see there
-    rate_change : float64[2, CHANGES] of the wheelset at hand, see `rails.predict_rate_changes`
-    parts : int64[N_PARTS]      see there
+    stepping : float64[N_STEPPING]  see there
+    rate_change : float64[2, RATE_CHANGE_SIZE] of this wheelset, see `rails.predict_rate_changes`
+    counts : int64[N_COUNTS]     see there
     extremes : float64[6, w, EXTREMES]  see `extremes`
-    present : float64[EXTREMES] scratch of the extremes
+    current : float64[EXTREMES] scratch of the extremes
     unloaded : float64[w, 2]    time during which each wheel has carried nothing [s]
     transient : float64[w, 2, p, TRANSIENT]  of each patch, see `transient`; w = 0 in steady rolling
     bump : float64[p, BUMP_SIZE]  heights of the wheel at hand by patch, see `wheel_surface`
     decay_part : float64[m]     as `decay` for a part of a step
-    memory : float64[...]       of commands, signals and laws of one's own, see `Own`
+    memory : float64[...]       of commands, signals and laws of one's own, see `UserLaws`
     element : float64[1, ELEMENT_COLUMNS]   of the element that a signal measures
     """
 
@@ -438,13 +438,13 @@ class Work(NamedTuple):
     laws: np.ndarray
     decay: np.ndarray
     contact_jacobian: np.ndarray
-    coupled: np.ndarray
+    slip_matrix: np.ndarray
     plane: np.ndarray
     rail: np.ndarray
     rail_motion: np.ndarray
     rail_cell: np.ndarray
     rail_u: np.ndarray
-    above: np.ndarray
+    wheelset: np.ndarray
     look_up: np.ndarray
     weights: np.ndarray
     stiffness: np.ndarray
@@ -460,11 +460,11 @@ class Work(NamedTuple):
     events: np.ndarray
     wheel: np.ndarray
     force_rate: np.ndarray
-    watch: np.ndarray
+    stepping: np.ndarray
     rate_change: np.ndarray
-    parts: np.ndarray
+    counts: np.ndarray
     extremes: np.ndarray
-    present: np.ndarray
+    current: np.ndarray
     unloaded: np.ndarray
     transient: np.ndarray
     bump: np.ndarray

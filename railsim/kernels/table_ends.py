@@ -1,8 +1,8 @@
-"""What it means that a wheel has left its contact table, or stands on none of its rails."""
+"""Status of a wheel that has left its contact table, or stands on none of its rails."""
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_table import ABOVE_Y, BELOW_Y, N_PATCH, OUTSIDE_ROLL
-from railsim.kernels.rail_parts import plain_gap
+from railsim.kernels.rail_parts import plain_height
 from railsim.kernels.status import (
     BESIDE_RAIL,
     DERAILED,
@@ -15,9 +15,9 @@ from railsim.kernels.status import (
     YAW_RANGE,
 )
 
-DEEPEST = 1e-3  # penetration under some 2 MN, more than any wheel that climbs carries (m)
+MAX_PENETRATION = 1e-3  # penetration under some 2 MN, more than any wheel that climbs carries (m)
 LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
-FALLEN_BY = 0.02  # depth below the plain rail to which no groove lets a wheel down (m)
+FALL_DEPTH = 0.02  # depth below the plain rail to which no groove lets a wheel down (m)
 
 
 @compiled(python=False)
@@ -30,13 +30,13 @@ def all_far(contact, table, iy, ir, iw, tr, z):
 
 
 @compiled
-def outside(contact, table, where, wheel, stretched):
+def end_status(contact, table, code, wheel, stretched):
     """Status code for a look-up outside the contact table."""
-    if where == ABOVE_Y:
+    if code == ABOVE_Y:
         return DERAILED if has_climbed(contact, table, wheel, stretched) else BESIDE_RAIL
-    if where == BELOW_Y:
+    if code == BELOW_Y:
         return INWARD_RANGE
-    if where == OUTSIDE_ROLL:
+    if code == OUTSIDE_ROLL:
         return ROLL_RANGE
     return YAW_RANGE
 
@@ -54,30 +54,30 @@ def has_climbed(contact, table, wheel, stretched):
     last = shape[4] - 3  # the last node of the range
     for patch in range(N_PATCH):
         # the top is level: yaw does not change how high the tip stands on it
-        here = contact.values[table, patch, 0, ir, last, 0]
-        following = contact.values[table, patch, 0, ir + 1, last, 0]
-        if wheel.z > here + (tr - ir) * (following - here) + DEEPEST:
+        z_1 = contact.values[table, patch, 0, ir, last, 0]
+        z_2 = contact.values[table, patch, 0, ir + 1, last, 0]
+        if wheel.z > z_1 + (tr - ir) * (z_2 - z_1) + MAX_PENETRATION:
             return False
     return True
 
 
 @compiled
-def beside_sections(contact, table, where, wheel, stretched):
-    """Status code beyond the plain table where a rail's section changes: see `outside`.
+def section_status(contact, table, code, wheel, stretched):
+    """Status code beyond the plain table where a rail's section changes: see `end_status`.
 
     There a rail may end or go aside, so that a wheel leaves it without having climbed it.
     """
-    status = outside(contact, table, where, wheel, stretched)
+    status = end_status(contact, table, code, wheel, stretched)
     return WRONG_SIDE if status == BESIDE_RAIL else status
 
 
 @compiled(python=False)
-def without_rail(rails, piece, wheel, nearest):
+def fall_status(rails, piece, wheel, nearest):
     """Status of a wheel that touches no rail of a piece and whose nearest one is so far below it.
 
     It falls; only where it is high above the plain rail it has been lifted.
     """
-    depth = wheel.z + rails.lever[piece] * wheel.roll - plain_gap(rails, piece, 0.0)
-    if depth > FALLEN_BY:
+    depth = wheel.z + rails.lever[piece] * wheel.roll - plain_height(rails, piece, 0.0)
+    if depth > FALL_DEPTH:
         return FALLEN
     return WHEEL_LIFT if nearest < -LIFT_RANGE and depth < -LIFT_RANGE else RUNNING

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.lanes import LANES, eight_from, eight_of, load_rows, starts, store_rows
+from railsim.kernels.lanes import LANES, gather, lane_numbers, load_rows, row_starts, store_rows
 from railsim.kernels.record import record
 from railsim.kernels.rotation import sine_cosine_lanes
 
@@ -23,7 +23,7 @@ X, Y, Z, PSI, THETA, PHI = range(6)
 # rows of TrackTables.rail
 Y_LEFT, Z_LEFT, Y_RIGHT, Z_RIGHT, MU_LEFT, MU_RIGHT = range(6)
 
-# columns of a frame row, see `track_frames`
+# columns of a frame row, see `set_frames`
 ORIGIN = 0  # 0:3   origin in global axes (m)
 ATTITUDE = 3  # 3:12  A, row by row
 OMEGA = 12  # 12:15 rate of turn per metre, frame axes (1/m)
@@ -60,7 +60,7 @@ class TrackTables(NamedTuple):
 
 
 @compiled(inline=True)
-def frame_columns(frames, offsets):
+def load_frames(frames, offsets):
     """Of eight frames: origin, attitude A, rate of turn per metre, its derivative over s."""
     x, y, z, a0, a1, a2, a3, a4 = load_rows(frames, offsets, 0, 8)
     a5, a6, a7, a8, w1, w2, w3, e1 = load_rows(frames, offsets, 8, 8)
@@ -69,7 +69,7 @@ def frame_columns(frames, offsets):
 
 
 @compiled(python=False)
-def cell_of(track, s):
+def track_cell(track, s):
     """Cell index of arc length `s`, -1 outside the table, and the distance into the cell [m]."""
     position = (s - track.s_start) / track.ds
     if not (position >= 0.0 and position < track.coefficients.shape[0]):  # NaN, inf: no index
@@ -89,7 +89,7 @@ def polynomial(c0, c1, c2, c3, u):
 
 
 @compiled(python=False)
-def track_frames(track, cell, cell_u, origin, frames):
+def set_frames(track, cell, cell_u, origin, frames):
     """Evaluate track frames into ``frames[:, FRAME_SIZE]``.
 
     Origins and attitudes are given in those of frame `origin` on the level (its heading, not its
@@ -102,7 +102,7 @@ def track_frames(track, cell, cell_u, origin, frames):
     Parameters
     ----------
     cell, cell_u : int64[f], float64[f]
-        Where the frames are, see `cell_of`.
+        Where the frames are, see `track_cell`.
     """
     c = track.coefficients
     x_0, y_0, z_0, turn = 0.0, 0.0, 0.0, 0.0
@@ -114,9 +114,9 @@ def track_frames(track, cell, cell_u, origin, frames):
         turn, _, _ = polynomial(c[i, PSI, 0], c[i, PSI, 1], c[i, PSI, 2], c[i, PSI, 3], t)
     sine, cosine = sin(turn), cos(turn)
     for first in range(0, cell.shape[0], LANES):
-        which = eight_from(first, cell.shape[0])
-        offsets = starts(eight_of(cell, which), 24)
-        u = load_rows(cell_u, which, 0, 1)[0]
+        lanes = lane_numbers(first, cell.shape[0])
+        offsets = row_starts(gather(cell, lanes), 24)
+        u = load_rows(cell_u, lanes, 0, 1)[0]
         x0, x1, x2, x3, y0, y1, y2, y3 = load_rows(c, offsets, 0, 8)
         z0, z1, z2, z3, p0, p1, p2, p3 = load_rows(c, offsets, 8, 8)
         t0, t1, t2, t3, f0, f1, f2, f3 = load_rows(c, offsets, 16, 8)
@@ -131,7 +131,7 @@ def track_frames(track, cell, cell_u, origin, frames):
         st, ct = sine_cosine_lanes(theta)
         sf, cf = sine_cosine_lanes(phi)
         east, north = x - x_0, y - y_0
-        row = starts(which, FRAME_SIZE)
+        row = row_starts(lanes, FRAME_SIZE)
         store_rows(
             frames,
             row,

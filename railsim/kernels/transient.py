@@ -1,7 +1,7 @@
 """Creep forces that take the length of the patch to follow the creepages.
 
 The creep laws hold for steady rolling.  Material enters a patch free of traction and has to pass it
-before a changed creepage acts all along: the followed creepages c, which the laws take instead of
+before a changed creepage acts all along: the delayed creepages c, which the laws take instead of
 those of the rigid bodies, xi, obey
 
     a c' + c = xi
@@ -39,86 +39,86 @@ from railsim.kernels.support import PATCH_STATE, SKIP, TRACED, TRANSIENT_SIZE, t
 
 # columns of Work.transient[w, side, patch], and of each patch in the state but for the last: c and
 # xi along, across and in spin; whether it carries; V/a [1/s]
-FOLLOWED, ROLLING, CARRIES, PER_TIME = 0, 3, 6, 7
+DELAYED, STEADY, LOADED, RATE = 0, 3, 6, 7
 TRANSIENT = PATCH_STATE + 1
-CARRIED, LOST = 1.0, 2.0  # values of CARRIES; 0 before anything is known
+CARRYING, UNLOADED = 1.0, 2.0  # values of LOADED; 0 before anything is known
 KNOWN, NEW = 0.5, 1.5  # beyond them there is a history, which is that of a patch that did not carry
 
 
 @compiled(python=False)
-def follow_creepages(system, work, n, state):
-    """Put the followed creepages of the active patches in place of their creepages."""
-    patch, now, h = work.patch, work.transient, state[LAST_STEP]
-    for w in range(now.shape[0]):
+def delay_creepages(system, work, n, state):
+    """Replace the creepages of the active patches by the delayed ones."""
+    patch, values, h = work.patch, work.transient, state[LAST_STEP]
+    for w in range(values.shape[0]):
         if system.support.elastic and work.support_step[w, SKIP] > 0.0:
             continue
         for side in range(2):
             for p in range(TRACED):
                 for c in range(TRANSIENT):
-                    now[w, side, p, c] = 0.0
-                now[w, side, p, CARRIES] = LOST
+                    values[w, side, p, c] = 0.0
+                values[w, side, p, LOADED] = UNLOADED
     for k in range(n):
         w, side, p = work.patch_index[k, 0], work.patch_index[k, 1], work.patch_index[k, 2]
         i = transient_begin(system) + TRANSIENT_SIZE * w + PATCH_STATE * (TRACED * side + p)
-        per_time = patch[PATCH_SPEED, k] / patch[A, k]
-        z = per_time * h
-        mean, kept = 1.0, 1.0
+        rate = patch[PATCH_SPEED, k] / patch[A, k]
+        z = rate * h
+        mean, decay = 1.0, 1.0
         if z > 0.0:
-            mean, kept = -expm1(-z) / z, exp(-z)
+            mean, decay = -expm1(-z) / z, exp(-z)
         for c in range(3):
-            xi, before = patch[XI_X + c, k], state[i + ROLLING + c]
-            followed = xi
-            if state[i + CARRIES] > NEW:
-                followed -= xi * kept
-            elif state[i + CARRIES] > KNOWN:
-                followed += (before - xi) * mean + (state[i + FOLLOWED + c] - before) * kept
-            now[w, side, p, FOLLOWED + c] = followed
-            now[w, side, p, ROLLING + c] = xi
-            patch[XI_X + c, k] = followed
-        now[w, side, p, CARRIES] = CARRIED
-        now[w, side, p, PER_TIME] = per_time
+            xi, xi_0 = patch[XI_X + c, k], state[i + STEADY + c]
+            delayed = xi
+            if state[i + LOADED] > NEW:
+                delayed -= xi * decay
+            elif state[i + LOADED] > KNOWN:
+                delayed += (xi_0 - xi) * mean + (state[i + DELAYED + c] - xi_0) * decay
+            values[w, side, p, DELAYED + c] = delayed
+            values[w, side, p, STEADY + c] = xi
+            patch[XI_X + c, k] = delayed
+        values[w, side, p, LOADED] = CARRYING
+        values[w, side, p, RATE] = rate
 
 
 @compiled(python=False)
-def give_back_creepages(system, work, n, state):
-    """Put the creepages back, and into the slopes what follows them within a step."""
-    patch, now, h = work.patch, work.transient, state[LAST_STEP]
+def restore_creepages(system, work, n, state):
+    """Restore the creepages; reduce the slopes to the response within a step."""
+    patch, values, h = work.patch, work.transient, state[LAST_STEP]
     for k in range(n):
         w, side, p = work.patch_index[k, 0], work.patch_index[k, 1], work.patch_index[k, 2]
         for c in range(3):
-            patch[XI_X + c, k] = now[w, side, p, ROLLING + c]
+            patch[XI_X + c, k] = values[w, side, p, STEADY + c]
         i = transient_begin(system) + TRANSIENT_SIZE * w + PATCH_STATE * (TRACED * side + p)
-        if state[i + CARRIES] > KNOWN:
-            z = now[w, side, p, PER_TIME] * h
-            at_once = 1.0 + expm1(-z) / z if z > 0.0 else 0.0
-            patch[SLOPE_ALONG, k] *= at_once
-            patch[SLOPE_ACROSS, k] *= at_once
-            patch[SECANT_ALONG, k] *= at_once
+        if state[i + LOADED] > KNOWN:
+            z = values[w, side, p, RATE] * h
+            response = 1.0 + expm1(-z) / z if z > 0.0 else 0.0
+            patch[SLOPE_ALONG, k] *= response
+            patch[SLOPE_ACROSS, k] *= response
+            patch[SECANT_ALONG, k] *= response
 
 
 @compiled(python=False)
-def keep_creepages(system, work, state):
-    """Keep what the last evaluation found in the state, from which a step begins."""
-    now, i = work.transient, transient_begin(system)
-    for w in range(now.shape[0]):
+def store_creepages(system, work, state):
+    """Store what the last evaluation found in the state, from which a step begins."""
+    values, i = work.transient, transient_begin(system)
+    for w in range(values.shape[0]):
         for side in range(2):
             for p in range(TRACED):
                 for c in range(PATCH_STATE):
-                    state[i] = now[w, side, p, c]
+                    state[i] = values[w, side, p, c]
                     i += 1
 
 
 @compiled(python=False)
-def creepage_rates(system, work, state, derivative):
-    """Rates of the followed creepages for the reference scheme."""
-    now, i = work.transient, transient_begin(system)
-    for w in range(now.shape[0]):
+def set_creepage_rates(system, work, state, derivative):
+    """Rates of the delayed creepages for the reference scheme."""
+    values, i = work.transient, transient_begin(system)
+    for w in range(values.shape[0]):
         for side in range(2):
             for p in range(TRACED):
-                per_time = now[w, side, p, PER_TIME]
+                rate = values[w, side, p, RATE]
                 for c in range(PATCH_STATE):
                     derivative[i + c] = 0.0
                 for c in range(3):
-                    change = now[w, side, p, ROLLING + c] - now[w, side, p, FOLLOWED + c]
-                    derivative[i + FOLLOWED + c] = per_time * change
+                    change = values[w, side, p, STEADY + c] - values[w, side, p, DELAYED + c]
+                    derivative[i + DELAYED + c] = rate * change
                 i += PATCH_STATE

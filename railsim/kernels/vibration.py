@@ -23,13 +23,13 @@ MEMORY = 0.1  # s
 # of value and difference; then of the largest vibration so far its amplitude [N], where it was [m]
 # and its frequency [Hz]; of the guiding force last value, last difference and second difference,
 # 16 A^2 of its alternation, of the largest so far, where that was [m]; second difference before
-BEGUN, Z_1, Z_2, LAST, SQUARE, CHANGE, AMPLITUDE, POSITION, FREQUENCY = range(9)
-LAST_Y, SLOPE, BEND, TURNS, ALTERNATION, ALTERNATES_AT, BEND_BEFORE = range(9, 16)
+STARTED, Z_1, Z_2, LAST, SQUARE, D_SQUARE, AMPLITUDE, POSITION, FREQUENCY = range(9)
+LAST_Y, D_Y, D2_Y, ALTERNATION_NOW, ALTERNATION, ALTERNATES_AT, LAST_D2_Y = range(9, 16)
 VIBRATION = 16  # whole cache lines
 
 
 @compiled(python=False)
-def high_pass(h):
+def high_pass_coefficients(h):
     """Coefficients of the filter at the step `h` [s]: b0 = -b1/2 = b2, a1, a2; fading in a step."""
     k = tan(pi * min(CUT_OFF * h, 0.4))
     scale = 1.0 / (1.0 + sqrt(2.0) * k + k * k)
@@ -42,49 +42,49 @@ def high_pass(h):
 
 
 @compiled(inline=True)
-def note_alternation(vibration, w, side, guiding, fading, s):
-    """Take up the guiding force of a wheel."""
-    slope = guiding - vibration[w, side, LAST_Y]
-    bend = slope - vibration[w, side, SLOPE]
-    last = vibration[w, side, BEND]
-    product = 0.5 * bend * (vibration[w, side, BEND_BEFORE] - last)
-    turns = fading * (vibration[w, side, TURNS] - product) + product
+def update_alternation(vibration, w, side, guiding, decay, s):
+    """Update the alternation of a wheel's guiding force."""
+    first = guiding - vibration[w, side, LAST_Y]
+    second = first - vibration[w, side, D_Y]
+    last = vibration[w, side, D2_Y]
+    product = 0.5 * second * (vibration[w, side, LAST_D2_Y] - last)
+    alternation = decay * (vibration[w, side, ALTERNATION_NOW] - product) + product
     vibration[w, side, LAST_Y] = guiding
-    vibration[w, side, SLOPE] = slope
-    vibration[w, side, BEND] = bend
-    vibration[w, side, BEND_BEFORE] = last
-    vibration[w, side, TURNS] = turns
-    if turns > vibration[w, side, ALTERNATION]:
-        vibration[w, side, ALTERNATION] = turns
+    vibration[w, side, D_Y] = first
+    vibration[w, side, D2_Y] = second
+    vibration[w, side, LAST_D2_Y] = last
+    vibration[w, side, ALTERNATION_NOW] = alternation
+    if alternation > vibration[w, side, ALTERNATION]:
+        vibration[w, side, ALTERNATION] = alternation
         vibration[w, side, ALTERNATES_AT] = s
 
 
 @compiled(python=False)
-def watch(work, coefficients, h, s):
-    """Take up the wheel loads of a step of length `h` that begins at arc length `s`.
+def update_vibration(work, coefficients, h, s):
+    """Update the vibrations by the loads of a step of length `h` that begins at arc length `s`.
 
-    `coefficients`: see `high_pass`.
+    `coefficients`: see `high_pass_coefficients`.
     """
     wheel, vibration = work.wheel, work.vibration
-    b0, a1, a2, fading = coefficients
+    b0, a1, a2, decay = coefficients
     for w in range(wheel.shape[0]):
         for side in range(2):
             load = wheel[w, side, 0]
-            if vibration[w, side, BEGUN] == 0.0:  # as after a long time at this load
-                vibration[w, side, BEGUN] = 1.0
+            if vibration[w, side, STARTED] == 0.0:  # as after a long time at this load
+                vibration[w, side, STARTED] = 1.0
                 vibration[w, side, Z_1] = -b0 * load
                 vibration[w, side, Z_2] = b0 * load
                 vibration[w, side, LAST_Y] = wheel[w, side, W_Y]
-            note_alternation(vibration, w, side, wheel[w, side, W_Y], fading, s)
+            update_alternation(vibration, w, side, wheel[w, side, W_Y], decay, s)
             value = b0 * load + vibration[w, side, Z_1]
             vibration[w, side, Z_1] = vibration[w, side, Z_2] - 2.0 * b0 * load - a1 * value
             vibration[w, side, Z_2] = b0 * load - a2 * value
             change = value - vibration[w, side, LAST]
             vibration[w, side, LAST] = value
-            square = value * value + fading * (vibration[w, side, SQUARE] - value * value)
-            changes = change * change + fading * (vibration[w, side, CHANGE] - change * change)
+            square = value * value + decay * (vibration[w, side, SQUARE] - value * value)
+            changes = change * change + decay * (vibration[w, side, D_SQUARE] - change * change)
             vibration[w, side, SQUARE] = square
-            vibration[w, side, CHANGE] = changes
+            vibration[w, side, D_SQUARE] = changes
             if 2.0 * square > vibration[w, side, AMPLITUDE] * vibration[w, side, AMPLITUDE]:
                 vibration[w, side, AMPLITUDE] = sqrt(2.0 * square)
                 vibration[w, side, POSITION] = s

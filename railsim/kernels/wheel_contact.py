@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.branches import rarely
+from railsim.kernels.branches import unlikely
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
     B_CHANGE,
+    B_E_PHI,
     B_K,
     B_K2,
-    B_LEAD,
     B_LEVER,
     B_RADIUS,
     B_RATE,
@@ -36,7 +36,7 @@ from railsim.kernels.contact_columns import (
     A,
     B,
 )
-from railsim.kernels.contact_damping import couple_stiffness, note_stiffness
+from railsim.kernels.contact_damping import couple_patch_stiffness, store_patch_stiffness
 from railsim.kernels.contact_table import (
     G_ROLL,
     G_W,
@@ -51,20 +51,18 @@ from railsim.kernels.contact_table import (
     K_Y,
     LOOK_UP_SIZE,
     N_PATCH,
-    cell_weights,
-    coupled_approaches,
+    couple_approaches,
+    find_cell,
     gap_curvature,
     is_far,
-    locate,
     look_up,
+    patch_under_load,
+    set_cell_weights,
     stretched_roll,
-    under_load,
 )
-from railsim.kernels.elements import RATE_OF_STOPS
-from railsim.kernels.rail_parts import COUNT, FIRST_PART, held, look_up_part, place_on_rails
+from railsim.kernels.elements import STOP_RATE
+from railsim.kernels.rail_parts import COUNT, FIRST_PART, clamp, look_up_rail, position_in_range
 from railsim.kernels.rails import (
-    ASIDE,
-    ASIDE_SLOPE,
     BEND_Z,
     CHANGE_ROLL,
     CHANGE_Y,
@@ -81,6 +79,8 @@ from railsim.kernels.rails import (
     RAIL_SLOPE,
     ROLL,
     ROLL_SLOPE,
+    SHIFT,
+    SHIFT_SLOPE,
     SINE,
     SLOPE_Y,
     SLOPE_Z,
@@ -89,20 +89,20 @@ from railsim.kernels.rails import (
 from railsim.kernels.state import SPEED, velocity_begin
 from railsim.kernels.status import RUNNING, WHEEL_LIFT, YAW_RANGE
 from railsim.kernels.support import SKIP
-from railsim.kernels.system import AHEAD, AT_SECTIONS, COS_ROLL, SIDEWAYS, SIN_ROLL, Y_0, Z_0
-from railsim.kernels.table_ends import LIFT_RANGE, all_far, beside_sections, outside, without_rail
+from railsim.kernels.system import COS_ROLL, HORIZON, LATERAL, SECTIONS, SIN_ROLL, Y_0, Z_0
+from railsim.kernels.table_ends import LIFT_RANGE, all_far, end_status, fall_status, section_status
 from railsim.kernels.track_frame import OMEGA
-from railsim.kernels.wheel_surface import AT_ONCE, note_surfaces, raise_gap
+from railsim.kernels.wheel_surface import DIVISION_RATE, store_surface_heights, subtract_height
 
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
-NEAR = 2e-3
+NEAR_GAP = 2e-3
 STEEP = 3.0  # of a flange
-SHORTEST = 1e-9  # s, so that nothing is divided by zero
+MIN_TIME = 1e-9  # s, so that nothing is divided by zero
 FADE = 30e-6  # penetration over which the contact damping is faded in (m)
 
 
 @compiled(python=False)
-def normal_contact(system, work, speed, state):
+def add_normal_contact(system, work, speed, state):
     """Look up all wheels, add elastic normal forces, list the active patches.
 
     Returns
@@ -111,10 +111,10 @@ def normal_contact(system, work, speed, state):
         Status code, the wheelset it concerns, number of active patches.
     """
     contact = system.contact
-    force, plane, above = work.rail_force, work.plane, work.above
+    force, plane, wheelset = work.rail_force, work.plane, work.wheelset
     jacobian = work.contact_jacobian
     n_bodies = system.bodies.kind.shape[0]
-    ahead = work.watch[AHEAD]
+    horizon = work.stepping[HORIZON]
     n = np.int64(0)  # a plain 0 would have everything that takes it compiled twice
     for w in range(contact.body.shape[0]):
         if system.support.elastic and work.support_step[w, SKIP] > 0.0:
@@ -141,18 +141,18 @@ def normal_contact(system, work, speed, state):
         yaw, yaw_rate = state[6 * b + 5], work.acceleration[b, 5]
         # a yawed axle on sloping rails is rolled against their plane
         slope, bend = plane[w, SLOPE_Z], plane[w, BEND_Z]
-        above[0], above[1] = y, z - height
-        above[2], above[3] = state[6 * b + 3] - plane[w, ROLL] + slope * yaw, yaw
-        above[4], above[5] = y_rate, z_rate
-        above[6] = work.acceleration[b, 3] - turn + slope * yaw_rate + speed * bend * yaw
-        above[7] = yaw_rate
-        above[8], above[9] = stretched_roll(above[2])
-        work.force_rate[w] = work.laws[RATE_OF_STOPS]
-        if ahead > 0.0 and system.track.has_irregularity:
+        wheelset[0], wheelset[1] = y, z - height
+        wheelset[2], wheelset[3] = state[6 * b + 3] - plane[w, ROLL] + slope * yaw, yaw
+        wheelset[4], wheelset[5] = y_rate, z_rate
+        wheelset[6] = work.acceleration[b, 3] - turn + slope * yaw_rate + speed * bend * yaw
+        wheelset[7] = yaw_rate
+        wheelset[8], wheelset[9] = stretched_roll(wheelset[2])
+        work.force_rate[w] = work.laws[STOP_RATE]
+        if horizon > 0.0 and system.track.has_irregularity:
             predict_rate_changes(system, work, w, state)
         for side in range(2):
-            status, n = wheel_contact(system, work, w, side, state, n)
-            if rarely(status != RUNNING):
+            status, n = add_wheel_contact(system, work, w, side, state, n)
+            if unlikely(status != RUNNING):
                 return status, w, n
         # from the plane to the track's axes; -dU/ds instead of the force along the track
         f_y, f_z = force[b, 1], force[b, 2]
@@ -187,54 +187,54 @@ class WheelOnRail(NamedTuple):
 
 
 @compiled(inline=True)
-def wheel_on_rail(work, w, side, speed):
-    """How the wheel `side` of wheelset `w`, which `work.above` describes, stands on its rail."""
-    rail, above, motion = work.rail, work.above, work.rail_motion
+def relative_wheel_motion(work, w, side, speed):
+    """How the wheel `side` of wheelset `w`, which `work.wheelset` describes, stands on its rail."""
+    rail, wheelset, motion = work.rail, work.wheelset, work.rail_motion
     sign = 2.0 * side - 1.0
-    aside, aside_slope = rail[w, side, ASIDE], rail[w, side, ASIDE_SLOPE]
+    shift, shift_slope = rail[w, side, SHIFT], rail[w, side, SHIFT_SLOPE]
     return WheelOnRail(
         sign,
-        sign * (above[0] - aside - motion[w, side, MOTION_Y]),
-        above[1] - motion[w, side, MOTION_Z],
-        sign * above[2],
-        above[3] - rail[w, side, RAIL_SLOPE],
-        sign * (above[4] - speed * aside_slope - motion[w, side, MOTION_Y_RATE]),
-        above[5] - motion[w, side, MOTION_Z_RATE],
-        sign * above[6],
-        above[7] - speed * rail[w, side, RAIL_BEND],
+        sign * (wheelset[0] - shift - motion[w, side, MOTION_Y]),
+        wheelset[1] - motion[w, side, MOTION_Z],
+        sign * wheelset[2],
+        wheelset[3] - rail[w, side, RAIL_SLOPE],
+        sign * (wheelset[4] - speed * shift_slope - motion[w, side, MOTION_Y_RATE]),
+        wheelset[5] - motion[w, side, MOTION_Z_RATE],
+        sign * wheelset[6],
+        wheelset[7] - speed * rail[w, side, RAIL_BEND],
     )
 
 
 @compiled(python=False)
-def wheel_contact(system, work, w, side, state, n):
+def add_wheel_contact(system, work, w, side, state, n):
     """Normal forces of one wheel, added to its wheelset's generalised ones in `work.rail_force`.
 
-    `work.above` holds the wheelset in the plane of its rails, `n` counts the active patches so far.
+    `work.wheelset`: the wheelset in the plane of its rails; `n` counts the active patches so far.
 
     Returns
     -------
     status, n : int
     """
-    contact, above = system.contact, work.above
+    contact, wheelset = system.contact, work.wheelset
     approach = work.approach
-    wheel = wheel_on_rail(work, w, side, state[SPEED])
+    wheel = relative_wheel_motion(work, w, side, state[SPEED])
     table = contact.table[w, side]
-    bumpy = contact.surface_of.shape[0] > 0
+    out_of_round = contact.surface_of.shape[0] > 0
     highest = 0.0
-    if rarely(bumpy):
-        highest = note_surfaces(system, work, state, w, side, wheel)
+    if unlikely(out_of_round):
+        highest = store_surface_heights(system, work, state, w, side, wheel)
     for k in range(contact.rails.range_of.shape[0]):
-        s, piece = place_on_rails(system, state, w, side, k, above[3])
-        if rarely(piece >= 0):
-            return wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n)
-    where, iy, ir, iw, ty, tr, tw = locate(
-        contact, table, wheel.y, wheel.roll, wheel.sign * above[8], wheel.yaw * wheel.yaw
+        s, piece = position_in_range(system, state, w, side, k, wheelset[3])
+        if unlikely(piece >= 0):
+            return add_section_contact(system, work, w, side, state, wheel, highest, s, piece, n)
+    code, iy, ir, iw, ty, tr, tw = find_cell(
+        contact, table, wheel.y, wheel.roll, wheel.sign * wheelset[8], wheel.yaw * wheel.yaw
     )
-    if rarely(where != INSIDE):
-        return outside(contact, table, where, wheel, wheel.sign * above[8]), n
+    if unlikely(code != INSIDE):
+        return end_status(contact, table, code, wheel, wheel.sign * wheelset[8]), n
     if tw > 1.0:
         work.events[w, 4] += 1
-    cell_weights(contact, ty, tr, above[9], work.weights)
+    set_cell_weights(contact, ty, tr, wheelset[9], work.weights)
     closing = closing_distance(work, side, wheel)
     lift = 1.0
     for patch in range(N_PATCH):
@@ -245,13 +245,13 @@ def wheel_contact(system, work, w, side, state, n):
             continue
         first = patch * LOOK_UP_SIZE
         look_up(contact, table, patch, iy, ir, iw, tw, work.weights, work.look_up, first)
-        if rarely(bumpy):
-            raise_gap(work.look_up, first, work.bump, patch, contact.shear[table])
+        if unlikely(out_of_round):
+            subtract_height(work.look_up, first, work.bump, patch, contact.shear[table])
         work.stiffness[patch] = work.look_up[first + 1]
         work.stiffness[N_PATCH + patch] = work.look_up[first + 2]
         approach[patch] = wheel.z - work.look_up[first]
         lift = min(lift, -approach[patch])
-    coupled_approaches(contact.coupling, table, work.stiffness, approach)
+    couple_approaches(contact.coupling, table, work.stiffness, approach)
     elastic = system.support.elastic
     for patch in range(N_PATCH):
         if elastic and approach[patch] > 0.0:
@@ -261,45 +261,45 @@ def wheel_contact(system, work, w, side, state, n):
     clear_wheel(work.wheel, w, side, lift)
     begin = n
     for patch in range(N_PATCH):
-        if approach[patch] > -NEAR - closing:
-            n = patch_contact(system, work, w, side, patch, wheel, n)
+        if approach[patch] > -NEAR_GAP - closing:
+            n = add_patch_contact(system, work, w, side, patch, wheel, n)
     if elastic and n > begin + 1:
-        couple_stiffness(work, contact.coupling, table, begin, n)
-    if rarely(lift > LIFT_RANGE) and all_far(contact, table, iy, ir, iw, tr, wheel.z):
+        couple_patch_stiffness(work, contact.coupling, table, begin, n)
+    if unlikely(lift > LIFT_RANGE) and all_far(contact, table, iy, ir, iw, tr, wheel.z):
         return WHEEL_LIFT, n
     return RUNNING, n
 
 
 @compiled(python=False)
-def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
-    """As `wheel_contact`, at the position `s` of a piece whose rails' sections change."""
-    contact, above, bump, approach = system.contact, work.above, work.bump, work.approach
+def add_section_contact(system, work, w, side, state, wheel, highest, s, piece, n):
+    """As `add_wheel_contact`, at the position `s` of a piece whose rails' sections change."""
+    contact, wheelset, bump, approach = system.contact, work.wheelset, work.bump, work.approach
     rails, table = contact.rails, contact.table[w, side]
-    stretched, wide = wheel.sign * above[8], wheel.yaw * wheel.yaw
-    where = locate(contact, table, wheel.y, wheel.roll, stretched, wide)[0]
-    if where != INSIDE:
-        return beside_sections(contact, table, where, wheel, stretched), n
-    stretched, slope, aside, turned = held(rails, wheel.y, wheel.roll, stretched, above[9])
-    where, iy, ir, iw, ty, tr, tw = locate(rails, 0, wheel.y - aside, wheel.roll, stretched, wide)
-    if where != INSIDE:
+    stretched, yaw_2 = wheel.sign * wheelset[8], wheel.yaw * wheel.yaw
+    code = find_cell(contact, table, wheel.y, wheel.roll, stretched, yaw_2)[0]
+    if code != INSIDE:
+        return section_status(contact, table, code, wheel, stretched), n
+    stretched, slope, d_y, d_roll = clamp(rails, wheel.y, wheel.roll, stretched, wheelset[9])
+    code, iy, ir, iw, ty, tr, tw = find_cell(rails, 0, wheel.y - d_y, wheel.roll, stretched, yaw_2)
+    if code != INSIDE:
         return YAW_RANGE, n
     if tw > 1.0:
         work.events[w, 4] += 1
-    cell_weights(rails, ty, tr, slope, work.weights)
+    set_cell_weights(rails, ty, tr, slope, work.weights)
     count = rails.piece[piece, COUNT]
     for patch in range(N_PATCH, N_PATCH * count):
         for k in range(BUMP_SIZE):
             bump[patch, k] = bump[patch % N_PATCH, k]
     lever = wheel.sign * rails.lever[piece]
     rate = state[SPEED] + state[6 * system.bodies.kind.shape[0] + 6 * contact.body[w]]
-    rate -= lever * above[7]
+    rate -= lever * wheelset[7]
     # to see every zone that may touch, however steep
     closing = closing_distance(work, side, wheel)
-    reach = wheel.z + highest + rails.lever[piece] * turned + STEEP * abs(aside) + closing
+    reach = wheel.z + highest + rails.lever[piece] * d_roll + STEEP * abs(d_y) + closing
     lift, nearest = 1.0, -1.0
     for number in range(count):
         first = N_PATCH * number
-        over = look_up_part(
+        depth = look_up_rail(
             system,
             work,
             (iy, ir, iw, tw, reach),
@@ -307,44 +307,44 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
             rails.piece[piece, FIRST_PART] + number,
             first,
         )
-        nearest = max(nearest, over)
+        nearest = max(nearest, depth)
         for patch in range(first, first + N_PATCH):
             if approach[patch] == 0.0:
                 k = patch * LOOK_UP_SIZE
                 shear, g_y = rails.shear[0], work.look_up[k + G_Y]
-                work.look_up[k] += aside * g_y + turned * (work.look_up[k + G_ROLL] + shear * g_y)
-                if aside != 0.0:  # beyond the tables the stiffness does not change any more
+                work.look_up[k] += d_y * g_y + d_roll * (work.look_up[k + G_ROLL] + shear * g_y)
+                if d_y != 0.0:  # beyond the tables the stiffness does not change any more
                     for y, roll in ((K_Y, K_ROLL), (K2_Y, K2_ROLL)):
                         work.look_up[k + roll] += shear * work.look_up[k + y]
                         work.look_up[k + y] = 0.0
-                raise_gap(work.look_up, k, bump, patch, shear)
+                subtract_height(work.look_up, k, bump, patch, shear)
                 work.stiffness[first + patch] = work.look_up[k + 1]
                 work.stiffness[first + patch + N_PATCH] = work.look_up[k + 2]
                 approach[patch] = wheel.z - work.look_up[k]
                 lift = min(lift, -approach[patch])
         stiffness = work.stiffness[2 * first : 2 * first + 2 * N_PATCH]
-        coupled_approaches(contact.coupling, table, stiffness, approach[first : first + N_PATCH])
+        couple_approaches(contact.coupling, table, stiffness, approach[first : first + N_PATCH])
     clear_wheel(work.wheel, w, side, lift)
-    if lift > 0.0:  # rails rise towards it: when it will strike is not foreseen
-        work.force_rate[w] = AT_ONCE
+    if lift > 0.0:  # rails rise towards it: when it will strike is not predicted
+        work.force_rate[w] = DIVISION_RATE
     begin = n
     for patch in range(N_PATCH * count):
         p = approach[patch]
-        if p > -NEAR - closing:
-            n = patch_contact(system, work, w, side, patch, wheel, n)
+        if p > -NEAR_GAP - closing:
+            n = add_patch_contact(system, work, w, side, patch, wheel, n)
         if p > 0.0:
             along = 0.4 * p * p * sqrt(p) * bump[patch, B_K] + p * p * p / 3.0 * bump[patch, B_K2]
             work.rail_force[contact.body[w], 0] -= along
             work.rail_force[contact.body[w], 5] += lever * along
-    couple_stiffness(work, contact.coupling, table, begin, n)
-    return without_rail(rails, piece, wheel, nearest) if lift > NEAR else RUNNING, n
+    couple_patch_stiffness(work, contact.coupling, table, begin, n)
+    return fall_status(rails, piece, wheel, nearest) if lift > NEAR_GAP else RUNNING, n
 
 
 @compiled(inline=True)
 def closing_distance(work, side, wheel):
     """How far a patch may come closer during the next step, a steep flange from the side [m]."""
     change = work.rate_change
-    return work.watch[AHEAD] * (
+    return work.stepping[HORIZON] * (
         abs(wheel.z_rate)
         + abs(change[side, CHANGE_Z])
         + STEEP * (abs(wheel.y_rate) + abs(change[side, CHANGE_Y]))
@@ -353,14 +353,14 @@ def closing_distance(work, side, wheel):
 
 @compiled(python=False)
 def clear_wheel(wheel, w, side, lift):
-    """Nothing yet acts on a wheel."""
+    """Clear the outputs of a wheel but for its lift."""
     for k in range(W_CHECK):
         wheel[w, side, k] = 0.0
     wheel[w, side, W_LIFT] = lift
 
 
 @compiled(python=False)
-def patch_contact(system, work, w, side, patch, wheel, n):
+def add_patch_contact(system, work, w, side, patch, wheel, n):
     """Normal force of one patch; where it carries, the patch becomes number `n` of the active ones.
 
     Returns
@@ -381,32 +381,32 @@ def patch_contact(system, work, w, side, patch, wheel, n):
         t[k + G_Y] * rate_change[side, CHANGE_Y] + t[k + G_ROLL] * rate_change[side, CHANGE_ROLL]
     )
     p_change += work.bump[patch, B_CHANGE]
-    ahead = work.watch[AHEAD]
-    inside = max(p, 0.0)
-    root = sqrt(inside)
-    elastic = inside * root * (t[k + 1] + root * t[k + 2])
+    horizon = work.stepping[HORIZON]
+    p_0 = max(p, 0.0)
+    root = sqrt(p_0)
+    elastic = p_0 * root * (t[k + 1] + root * t[k + 2])
     change = max(abs(p_rate), abs(p_rate + p_change))
-    soon = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) * change
+    rate = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) * change
     # also from a light touch, where the stiffness is still small; without branches, as whether it
     # comes closer alternates from step to step
-    deepest = max(inside, p + ahead * (p_rate + max(p_change, 0.0)))
-    deep = sqrt(deepest)
-    gained = deepest * deep * (t[k + 1] + deep * t[k + 2]) - elastic
-    soon = max(soon, gained / max(ahead, SHORTEST))
-    if rarely(work.watch[AT_SECTIONS] > 1.0):  # rails with masses: a blow begins with the damping
-        fades = min(1.0, deepest / FADE) - min(1.0, inside / FADE)
-        soon += contact.damping * fades * change / max(ahead, SHORTEST)
-    soon *= max(1.0, work.watch[SIDEWAYS] * abs(t[k + G_Y]))
-    work.force_rate[w] = max(work.force_rate[w], soon)
+    p_1 = max(p_0, p + horizon * (p_rate + max(p_change, 0.0)))
+    root_1 = sqrt(p_1)
+    gain = p_1 * root_1 * (t[k + 1] + root_1 * t[k + 2]) - elastic
+    rate = max(rate, gain / max(horizon, MIN_TIME))
+    if unlikely(work.stepping[SECTIONS] > 1.0):  # rails with masses: a blow begins with the damping
+        fades = min(1.0, p_1 / FADE) - min(1.0, p_0 / FADE)
+        rate += contact.damping * fades * change / max(horizon, MIN_TIME)
+    rate *= max(1.0, work.stepping[LATERAL] * abs(t[k + G_Y]))
+    work.force_rate[w] = max(work.force_rate[w], rate)
     if p > 0.0:
-        c_y, c_z, a1, b1, tangent = under_load(t, k, max(elastic, 0.0))
+        c_y, c_z, a1, b1, tangent = patch_under_load(t, k, max(elastic, 0.0))
         cos_2 = 1.0 / (1.0 + tangent * tangent)
         fade = min(1.0, p / FADE)
         vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
         add_normal_force(work, contact.body[w], w, side, wheel, p, k, vertical)
-        if rarely(contact.surface_of.shape[0] + contact.rails.range_of.shape[0] > 0):
+        if unlikely(contact.surface_of.shape[0] + contact.rails.range_of.shape[0] > 0):
             # moment about the axle
-            work.rail_force[contact.body[w], 4] += vertical * work.bump[patch, B_LEAD]
+            work.rail_force[contact.body[w], 4] += vertical * work.bump[patch, B_E_PHI]
             along = vertical * work.bump[patch, B_RISE]
             work.rail_force[contact.body[w], 0] -= along
             work.rail_force[contact.body[w], 5] += work.bump[patch, B_LEVER] * along
@@ -423,12 +423,12 @@ def patch_contact(system, work, w, side, patch, wheel, n):
             # the normal meets the axle: c + lambda n lies on it, and n does not point along
             per_yaw = wheel.sign * (c_z * tangent - c_y)
             column[FOOT_X_PER_YAW, n] = per_yaw
-            column[FOOT_X, n] = wheel.yaw * per_yaw + work.bump[patch, B_LEAD]
+            column[FOOT_X, n] = wheel.yaw * per_yaw + work.bump[patch, B_E_PHI]
             column[FOOT_Y, n] = wheel.sign * c_y
             column[FOOT_Z, n] = c_z + work.bump[patch, B_RADIUS]
             column[RISE, n] = work.bump[patch, B_RISE]
             column[PENETRATION, n] = p
-            note_stiffness(system, work, w, n, k, wheel.sign, p, vertical)
+            store_patch_stiffness(system, work, w, n, k, wheel.sign, p, vertical)
             column[NORMAL_DAMPING, n] = contact.damping * fade
             work.patch_index[n, 0] = w
             work.patch_index[n, 1] = side
@@ -447,7 +447,7 @@ def add_normal_force(work, b, w, side, wheel, p, k, vertical):
     per_K, per_K2 = 0.4 * p * p * sqrt(p), p * p * p / 3.0
     q_y = wheel.sign * (vertical * t[k + G_Y] - per_K * t[k + K_Y] - per_K2 * t[k + K2_Y])
     q_yaw = (vertical * t[k + G_W] - per_K * t[k + K_W] - per_K2 * t[k + K2_W]) * 2.0 * wheel.yaw
-    force[b, 0] -= q_y * rail[w, side, ASIDE_SLOPE] + q_yaw * rail[w, side, RAIL_BEND]
+    force[b, 0] -= q_y * rail[w, side, SHIFT_SLOPE] + q_yaw * rail[w, side, RAIL_BEND]
     force[b, 1] += q_y
     force[b, 2] -= vertical
     force[b, 3] += wheel.sign * (

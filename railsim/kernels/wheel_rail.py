@@ -4,9 +4,9 @@ Per wheel and patch, with the table's gap g and stiffness K (see `contact_table`
 
 - penetration p = z - g, less what the loads of neighbouring patches bend the surfaces; elastic
   normal force as the gradient of the potential U, which includes the terms from the change of the
-  stiffnesses along the profile (`coupled_approaches`); position, direction and ellipse of the patch
-  under its load (`under_load`); y, z, roll of the wheelset in the plane of the rails, yaw against
-  each rail's own direction (see `rails`);
+  stiffnesses along the profile (`couple_approaches`); position, direction and ellipse of the patch
+  under its load (`patch_under_load`); y, z, roll of the wheelset in the plane of the rails, yaw
+  against each rail's own direction (see `rails`);
 - contact damping c_N on the *geometric* rate of approach, faded in over 30 um, the sum never
   pulling;
 - the rail at the patch has the direction d = (1, t_y, t_z), from the turn of the frame at that
@@ -24,7 +24,7 @@ the angle g > 0 where the normal leans to the right; on the wheel the opposite, 
 """
 
 from railsim.kernels import compiled
-from railsim.kernels.branches import rarely
+from railsim.kernels.branches import unlikely
 from railsim.kernels.check_rails import add_check_rails
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
@@ -35,7 +35,7 @@ from railsim.kernels.contact_columns import (
     C_Z,
     J_ALONG,
     J_SECANT,
-    J_SECANT_LEVER,
+    J_SECANT_C_Z,
     J_SECANT_YAW,
     M_Z,
     NORMAL,
@@ -50,8 +50,8 @@ from railsim.kernels.contact_columns import (
     SLOPE_ALONG,
     T_X,
     T_Y,
-    TURN_Y,
-    TURN_Z,
+    TANGENT_Y,
+    TANGENT_Z,
     W_C_Y,
     W_C_Z,
     W_NORMAL,
@@ -68,26 +68,26 @@ from railsim.kernels.contact_columns import (
     B,
 )
 from railsim.kernels.contact_damping import (
-    WALKING,
-    add_damping,
-    add_slopes,
-    begin_support,
-    couple_directions,
-    creep_slopes,
+    COUPLING_SPEED,
+    add_rail_slopes,
+    add_slip_coupling,
+    add_wheelset_damping,
+    clear_support,
+    estimate_creep_slopes,
 )
-from railsim.kernels.creep import creep_forces, falling_friction
-from railsim.kernels.creepages import creepages
+from railsim.kernels.creep import creep_forces, reduce_friction
+from railsim.kernels.creepages import set_creepages
 from railsim.kernels.cube_root import cube_root
-from railsim.kernels.fastsim import kalker_lookup
-from railsim.kernels.own_laws import own_friction
-from railsim.kernels.patches import side_by_side
+from railsim.kernels.fastsim import look_up_kalker
+from railsim.kernels.patches import patch_arrays
 from railsim.kernels.rails import locate_rails
 from railsim.kernels.state import ARC_LENGTH, LAST_STEP
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import PATCHES, SKIP, complete_slopes, rail_motions, step_compliance
+from railsim.kernels.support import PATCHES, SKIP, add_lms_slopes, set_compliance, set_rail_motions
 from railsim.kernels.system import IMPLICIT
-from railsim.kernels.transient import follow_creepages, give_back_creepages
-from railsim.kernels.wheel_contact import complete_normal_force, normal_contact
+from railsim.kernels.transient import delay_creepages, restore_creepages
+from railsim.kernels.user_laws import user_friction
+from railsim.kernels.wheel_contact import add_normal_contact, complete_normal_force
 
 
 @compiled(python=False)
@@ -95,23 +95,23 @@ def add_creep_forces(system, work, n, speed, state):
     """Put the tangential forces on the wheelsets and gather the wheels' outputs."""
     contact = system.contact
     patch, force, wheel = work.patch, work.rail_force, work.wheel
-    stiff = work.watch[IMPLICIT] * abs(state[LAST_STEP])
+    stiff = work.stepping[IMPLICIT] * abs(state[LAST_STEP])
     for k in range(n):
         w, side = work.patch_index[k, 0], work.patch_index[k, 1]
         b = contact.body[w]
         s, c = patch[NORMAL_Y, k], patch[NORMAL_Z, k]
-        turn_y, turn_z = patch[TURN_Y, k], patch[TURN_Z, k]
+        t_y, t_z = patch[TANGENT_Y, k], patch[TANGENT_Z, k]
         T_x, T_y = patch[T_X, k], patch[T_Y, k]
-        # T_x along (1, turn_y, turn_z), T_y and the normal at right angles to it
-        fx = -T_x + T_y * (turn_y * c - turn_z * s)
-        fy = -T_x * turn_y - T_y * c
-        fz = -T_x * turn_z + T_y * s
+        # T_x along (1, t_y, t_z), T_y and the normal at right angles to it
+        fx = -T_x + T_y * (t_y * c - t_z * s)
+        fy = -T_x * t_y - T_y * c
+        fz = -T_x * t_z + T_y * s
         cx, cy, cz = patch[C_X, k], patch[C_Y, k], patch[C_Z, k]
         mz = patch[M_Z, k]
         force[b, 0] += fx
         force[b, 1] += fy
         force[b, 2] += fz
-        force[b, 3] += cy * fz - cz * fy + mz * (turn_y * s + turn_z * c)
+        force[b, 3] += cy * fz - cz * fy + mz * (t_y * s + t_z * c)
         force[b, 4] += cz * fx - cx * fz - mz * s
         force[b, 5] += cx * fy - cy * fx - mz * c
         # in the plane of the rails
@@ -131,7 +131,7 @@ def add_creep_forces(system, work, n, speed, state):
         secant, across = patch[SECANT_ALONG, k], patch[SLOPE_ACROSS, k]
         damping = patch[NORMAL_DAMPING, k]
         if system.support.elastic:
-            add_slopes(work, w, side, k, across, contact.shear[contact.table[w, side]])
+            add_rail_slopes(work, w, side, k, across, contact.shear[contact.table[w, side]])
             work.support[w, side, PATCHES] += float(1 << work.patch_index[k, 2])
             # a rail that gives way is in series with creep force and contact
             y, z, lag = work.compliance[0], work.compliance[1], work.compliance[2]
@@ -142,17 +142,17 @@ def add_creep_forces(system, work, n, speed, state):
             damping += stiff * patch[NORMAL_STIFFNESS, k]
         work.contact_jacobian[b, J_ALONG] += patch[SLOPE_ALONG, k]
         work.contact_jacobian[b, J_SECANT] += secant
-        work.contact_jacobian[b, J_SECANT_LEVER] += secant * cz
+        work.contact_jacobian[b, J_SECANT_C_Z] += secant * cz
         work.contact_jacobian[b, J_SECANT_YAW] += secant * cy * cy
-        add_damping(work, b, k, across, damping)
+        add_wheelset_damping(work, b, k, across, damping)
         work.events[w, 0] += 1
         work.events[w, 1] += int(patch[BEYOND, k])
     if system.support.elastic:
-        complete_slopes(system, work, state)
+        add_lms_slopes(system, work, state)
 
 
 @compiled(python=False)
-def wheel_rail(system, work, speed, state):
+def set_wheel_rail_forces(system, work, speed, state):
     """All wheel-rail forces on the wheelsets, track axes, into ``work.rail_force``.
 
     Row b of `rail_force`: force (3) and moment about the wheelset's centre (3).
@@ -164,10 +164,10 @@ def wheel_rail(system, work, speed, state):
     """
     locate_rails(system, work, state[ARC_LENGTH])
     if system.support.elastic:
-        rail_motions(system, work, state)
-        step_compliance(system, work, state)
-        begin_support(work.support, work.support_step)
-    status, w, n = normal_contact(system, work, speed, state)
+        set_rail_motions(system, work, state)
+        set_compliance(system, work, state)
+        clear_support(work.support, work.support_step)
+    status, w, n = add_normal_contact(system, work, speed, state)
     if status != RUNNING:
         return status, w, n
     for k in range(system.contact.body.shape[0]):
@@ -175,32 +175,32 @@ def wheel_rail(system, work, speed, state):
         if system.support.elastic and work.support_step[k, SKIP] > 0.0:
             continue
         complete_normal_force(system, work, b, state)
-    if rarely(system.contact.check.shape[0] > 0):
+    if unlikely(system.contact.check.shape[0] > 0):
         add_check_rails(system, work, speed, state)
     patch = work.patch
     for k in range(n):  # here and not above, where each patch would wait for its root
         third = cube_root(patch[NORMAL, k])
         patch[A, k] *= third
         patch[B, k] *= third
-    creepages(system, work, n, speed, state)
+    set_creepages(system, work, n, speed, state)
     contact = system.contact
-    patches = side_by_side(patch)
-    kalker_lookup(n, patches, contact.kalker)
-    if rarely(contact.friction_law != 0):
-        own_friction(n, patches, patch[PATCH_SPEED], contact.friction_law, contact.friction_block)
-    elif rarely(contact.friction_rest < 1.0):
-        falling_friction(
+    patches = patch_arrays(patch)
+    look_up_kalker(n, patches, contact.kalker)
+    if unlikely(contact.friction_law != 0):
+        user_friction(n, patches, patch[PATCH_SPEED], contact.friction_law, contact.friction_block)
+    elif unlikely(contact.friction_rest < 1.0):
+        reduce_friction(
             n, patches, patch[PATCH_SPEED], contact.friction_rest, contact.friction_decay
         )
-    if rarely(contact.transient != 0):
-        follow_creepages(system, work, n, state)
+    if unlikely(contact.transient != 0):
+        delay_creepages(system, work, n, state)
     creep_forces(n, contact.law, patches, work.creep)
     G = contact.law.k_adhesion * contact.law.G
     slopes = patch[SLOPE_ALONG], patch[SLOPE_ACROSS], patch[SECANT_ALONG]
-    creep_slopes(n, patches, speed, G, *slopes)
-    if rarely(contact.transient != 0):
-        give_back_creepages(system, work, n, state)
-    if rarely(speed < WALKING):
-        couple_directions(system, work, n)
+    estimate_creep_slopes(n, patches, speed, G, *slopes)
+    if unlikely(contact.transient != 0):
+        restore_creepages(system, work, n, state)
+    if unlikely(speed < COUPLING_SPEED):
+        add_slip_coupling(system, work, n)
     add_creep_forces(system, work, n, speed, state)
     return RUNNING, 0, n

@@ -20,27 +20,27 @@ import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import (
-    B_ACROSS,
     B_CHANGE,
+    B_E_PHI,
+    B_E_Y,
     B_HEIGHT,
-    B_LEAD,
     B_RADIUS,
     B_RATE,
     BUMP_SIZE,
 )
 from railsim.kernels.contact_table import G_ROLL, G_Y, N_PATCH, TREAD
-from railsim.kernels.rail_parts import lowest_gap, near_range, place_on_rails, plain_gap
-from railsim.kernels.rails import ASIDE, ROLL
+from railsim.kernels.rail_parts import contact_height, near_range, plain_height, position_in_range
+from railsim.kernels.rails import ROLL, SHIFT
 from railsim.kernels.state import ARC_LENGTH, SPEED, velocity_begin
-from railsim.kernels.system import AHEAD, RADIUS
+from railsim.kernels.system import HORIZON, RADIUS
 
 # columns of Contact.surface_row: first row of its values and of its angles to the next flat, number
 # of nodes over the angle and in y, first node and spacing in y [m]; length of its shortest flat and
 # of the shortest wave all around it, which steps resolve [m]
-FIRST, FIRST_AHEAD, N_PHI, N_Y, Y0, DY, FLAT, WAVE = range(8)
+FIRST, FIRST_FLAT, N_PHI, N_Y, Y0, DY, FLAT, WAVE = range(8)
 SURFACE_ROW = 8
-HELD = 5e-4  # m, lateral way on which foreseen heights of rails keep their lateral position
-AT_ONCE = 1e12  # N/s, rate of a force that has its step divided
+Y_HOLD = 5e-4  # m, lateral way on which predicted heights of rails keep their lateral position
+DIVISION_RATE = 1e12  # N/s, rate of a force that has its step divided
 
 
 @compiled(inline=True)
@@ -56,7 +56,7 @@ def wheel_angle(system, state, w):
 
 
 @compiled(inline=True)
-def cell_around(phi, n_phi):
+def angle_cell(phi, n_phi):
     """Number of the cell at an angle, of `n_phi` around the wheel, and the part of it passed.
 
     Neither NaN nor an angle beyond all integers becomes an index.
@@ -68,13 +68,13 @@ def cell_around(phi, n_phi):
 
 
 @compiled(python=False)
-def surface_at(contact, table, phi, y):
+def surface_height(contact, table, phi, y):
     """Height e [m] of a wheel at an angle and a lateral position, with e_phi [m] and e_y [1]."""
     row = contact.surface_row
     values = contact.surface
     n_phi, n_y = int(row[table, N_PHI]), int(row[table, N_Y])
     step = 2.0 * pi / n_phi
-    i, x = cell_around(phi, n_phi)
+    i, x = angle_cell(phi, n_phi)
     after = i + 1 if i + 1 < n_phi else 0
     dy = row[table, DY]
     u = min(max((y - row[table, Y0]) / dy, 0.0), n_y - 1.0)
@@ -85,7 +85,7 @@ def surface_at(contact, table, phi, y):
     a0, a1 = (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u), u * u * (3.0 - 2.0 * u)
     b0, b1 = dy * u * (1.0 - u) * (1.0 - u), dy * u * u * (u - 1.0)
     da, db0, db1 = 6.0 * u * (1.0 - u) / dy, (1.0 - u) * (1.0 - 3.0 * u), u * (3.0 * u - 2.0)
-    e, lead, across = 0.0, 0.0, 0.0
+    e, e_phi, e_y = 0.0, 0.0, 0.0
     for end in range(2):
         k = first + (after if end else i) * n_y + j
         value = (
@@ -104,21 +104,21 @@ def surface_at(contact, table, phi, y):
         sign = 1.0 if end else -1.0
         share, turn = t * t * (3.0 - 2.0 * t), sign * step * t * t * (t - 1.0)
         e += share * value + turn * slope
-        across += share * value_y + turn * slope_y
-        lead += sign * 6.0 * t * (1.0 - t) / step * value + t * (3.0 * t - 2.0) * slope
-    return e, lead, inside * across
+        e_y += share * value_y + turn * slope_y
+        e_phi += sign * 6.0 * t * (1.0 - t) / step * value + t * (3.0 * t - 2.0) * slope
+    return e, e_phi, inside * e_y
 
 
 @compiled(python=False)
 def angle_to_flat(contact, table, phi):
     """Angle that the wheel has still to roll until it is at a flat, 0 on one [rad]."""
     n_phi = int(contact.surface_row[table, N_PHI])
-    i, _ = cell_around(phi, n_phi)
-    return contact.flat_ahead[int(contact.surface_row[table, FIRST_AHEAD]) + i]
+    i, _ = angle_cell(phi, n_phi)
+    return contact.flat_ahead[int(contact.surface_row[table, FIRST_FLAT]) + i]
 
 
 @compiled(python=False)
-def note_surfaces(system, work, state, w, side, wheel):
+def store_surface_heights(system, work, state, w, side, wheel):
     """Heights of a wheel that is not round into `work.bump`, by patch.
 
     Returns
@@ -126,7 +126,7 @@ def note_surfaces(system, work, state, w, side, wheel):
     float
         Largest e of the patches [m].
     """
-    contact, bump, h = system.contact, work.bump, work.watch[AHEAD]
+    contact, bump, h = system.contact, work.bump, work.stepping[HORIZON]
     if contact.surface_of[w, side, TREAD] < 0:  # round
         for patch in range(N_PATCH):
             for k in range(BUMP_SIZE):
@@ -143,23 +143,23 @@ def note_surfaces(system, work, state, w, side, wheel):
             continue
         shear = contact.shear[contact.table[w, side]]
         y = wheel.y - shear * wheel.roll
-        e, lead, across = surface_at(contact, table, phi, y)
+        e, e_phi, e_y = surface_height(contact, table, phi, y)
         bump[patch, B_HEIGHT] = e
         bump[patch, B_RADIUS] = e
-        bump[patch, B_RATE] = lead * rate
-        bump[patch, B_LEAD] = lead
-        bump[patch, B_ACROSS] = across
+        bump[patch, B_RATE] = e_phi * rate
+        bump[patch, B_E_PHI] = e_phi
+        bump[patch, B_E_Y] = e_y
         most = max(most, e)
         if h > 0.0:
-            _, later, _ = surface_at(contact, table, phi + rate * h, y)
-            bump[patch, B_CHANGE] = (later - lead) * rate
+            _, e_phi_1, _ = surface_height(contact, table, phi + rate * h, y)
+            bump[patch, B_CHANGE] = (e_phi_1 - e_phi) * rate
             if angle_to_flat(contact, table, phi) < rate * h:
-                work.force_rate[w] = AT_ONCE
+                work.force_rate[w] = DIVISION_RATE
     return most
 
 
 @compiled(python=False)
-def foreseen_heights(system, work, state, w, track, first):
+def predict_tread_heights(system, work, state, w, track, first):
     """Heights e of both treads and their rates into ``track[first:first + 4]``.
 
     The next two are the lateral positions at which heights of rails are taken [m].
@@ -178,28 +178,28 @@ def foreseen_heights(system, work, state, w, track, first):
         sign = 2.0 * side - 1.0
         shear = contact.shear[contact.table[w, side]]
         roll = state[6 * b + 3] - work.plane[w, ROLL]
-        y = sign * (state[6 * b + 1] - work.rail[w, side, ASIDE] - shear * roll)
+        y = sign * (state[6 * b + 1] - work.rail[w, side, SHIFT] - shear * roll)
         track[first + side] = track[first + 2 + side] = 0.0
         table = contact.surface_of[w, side, TREAD]
         if table >= 0:
-            e, lead, _ = surface_at(contact, table, phi, y)
+            e, e_phi, _ = surface_height(contact, table, phi, y)
             track[first + side] = e
-            track[first + 2 + side] = lead * rate
+            track[first + 2 + side] = e_phi * rate
         for k in range(contact.rails.range_of.shape[0]):
-            s, piece = place_on_rails(system, state, w, side, k, state[6 * b + 5])
+            s, piece = position_in_range(system, state, w, side, k, state[6 * b + 5])
             if piece >= 0:
                 # at the lateral position before the step: the rest is in the slopes of the forces
-                if abs(track[first + 4 + side] - y) > HELD:
+                if abs(track[first + 4 + side] - y) > Y_HOLD:
                     track[first + 4 + side] = y
                 y = track[first + 4 + side]
-                low, fall = lowest_gap(contact.rails, piece, s, y)
-                track[first + side] += plain_gap(contact.rails, piece, y) - low
+                low, fall = contact_height(contact.rails, piece, s, y)
+                track[first + side] += plain_height(contact.rails, piece, y) - low
                 track[first + 2 + side] -= fall * state[SPEED]
 
 
 @compiled(inline=True)
-def raise_gap(look_up, first, bump, patch, shear):
+def subtract_height(look_up, first, bump, patch, shear):
     """Take the height of a wheel that is not round from the gap of a patch and its gradients."""
     look_up[first] -= bump[patch, B_HEIGHT]
-    look_up[first + G_Y] -= bump[patch, B_ACROSS]
-    look_up[first + G_ROLL] += shear * bump[patch, B_ACROSS]
+    look_up[first + G_Y] -= bump[patch, B_E_Y]
+    look_up[first + G_ROLL] += shear * bump[patch, B_E_Y]

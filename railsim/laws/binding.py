@@ -1,7 +1,7 @@
 """From the text of a law to an address that the time loop calls; the loop is not compiled again.
 
 A law has one argument there: the address of its block of numbers, first what it gives, then what
-it is given (see `railsim.kernels.own_laws`).
+it is given (see `railsim.kernels.user_laws`).
 """
 
 import ast

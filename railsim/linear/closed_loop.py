@@ -51,9 +51,9 @@ def closed_loop(
     prepared = LinearVehicle(vehicle, track, settings=settings, **how)
     free = prepared.free(speed)
     delays = free.system.actuators.row[:, acts.DELAY].copy()
-    which = free.system.actuators.which.copy()
+    which = free.system.actuators.codes.copy()
     which[:, acts.SLOTS] = 0  # commands arrive at once, their delay is that of the loop
-    free.system = free.system._replace(actuators=free.system.actuators._replace(which=which))
+    free.system = free.system._replace(actuators=free.system.actuators._replace(codes=which))
     n = len(free.coordinates.names)
     A, B = free.tangent(), _rates_by_command(free)
     K, D, delay = _loop(prepared, free, vehicle, settings or Settings(), delays + step)
@@ -76,7 +76,7 @@ def closed_loop(
 
 def _rates_by_command(free: FreeVehicle) -> Floats:
     """How the rates follow the commands: B, float64[n, m]."""
-    where, memory = free.system.actuators.which[:, acts.COMMAND], free.work.memory
+    where, memory = free.system.actuators.codes[:, acts.COMMAND], free.work.memory
 
     def rate(commands: Floats) -> Floats:
         memory[where] = commands
@@ -94,24 +94,24 @@ def _loop(
     """What controllers give for a state: w = K x + D u, and its delays [s]."""
     model = with_control(linear.model, vehicle, settings)
     signals, controllers = model.system.signals, model.system.controllers
-    plain, row = signals.which.copy(), signals.row.copy()
+    plain, row = signals.codes.copy(), signals.row.copy()
     plain[:, kernel.SLOTS] = 0
     row[:, [kernel.PERIOD, kernel.DELAY, kernel.NOISE, kernel.RESOLUTION]] = 0.0
     system = linear.system._replace(
         actuators=free.system.actuators,
-        signals=signals._replace(which=plain, row=row),
+        signals=signals._replace(codes=plain, row=row),
         controllers=controllers,
-        own=model.system.own,
+        user_laws=model.system.user_laws,
     )
-    where = system.actuators.which[:, acts.COMMAND]
+    where = system.actuators.codes[:, acts.COMMAND]
     work, recorder = work_arrays(system), empty_recorder(linear.model, 1)
 
     def given(x: Floats, u: Floats) -> Floats:
         """Commands for a state and commands before, by one call of the time loop."""
         state = free.state.copy()
         state[free.coordinates.indices] = x
-        work.memory[:] = system.own.memory
-        work.memory[kernel.START], work.memory[where] = state[TIME], u
+        work.memory[:] = system.user_laws.memory
+        work.memory[kernel.RUN_START], work.memory[where] = state[TIME], u
         rates, stages = np.zeros_like(state), np.zeros((3, len(state)))
         how = recorder, FAST, 1e-3, Chunk(0, 0, 1, 0, 1)
         status, *_ = time_loop(system, work, state, rates, stages, *how)
@@ -123,9 +123,9 @@ def _loop(
     steps = np.full(len(where), COMMAND_STEP)
     K = jacobian(lambda rows: np.array([given(row, u) for row in rows]), x, free.coordinates.steps)
     D = jacobian(lambda rows: np.array([given(x, row) for row in rows]), u, steps)
-    for c, one in enumerate(controllers.which):
-        begin, gives = one[kernel.WIRES], one[kernel.GIVES]
-        wires = controllers.wires[begin : begin + gives + one[kernel.TAKES]]
+    for c, one in enumerate(controllers.codes):
+        begin, gives = one[kernel.FIRST_PORT], one[kernel.N_OUT]
+        wires = controllers.ports[begin : begin + gives + one[kernel.N_IN]]
         late = signals.row[wires[gives:], kernel.DELAY].max(initial=0.0)
         held = signals.row[wires[gives:], kernel.PERIOD].max(initial=controllers.period[c])
         delay[wires[:gives]] += 0.5 * held + late

@@ -15,7 +15,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.kernels.internal import PAD
 from railsim.kernels.state import internal_begin
-from railsim.kernels.step_rk4 import settle_limits
+from railsim.kernels.step_rk4 import restore_limits
 from railsim.kernels.system import System
 from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
@@ -58,7 +58,7 @@ class Sliding(SteadyRolling):
                 deflection, force = self._since
                 moved = self.deflection() - deflection
                 state[self._first + self._pads] = force + stiffness * moved
-                settle_limits(
+                restore_limits(
                     self.system.internal, self.system.curves, self._first, self.work.drive, state
                 )
                 derivative[:] = super()._derivatives(state[None])

@@ -14,7 +14,7 @@ import numpy as np
 from railsim.arrays import Floats, first_largest
 from railsim.constants import CANT_BASE
 from railsim.definitions import Track
-from railsim.kernels.aligned import aligned
+from railsim.kernels.alignment import aligned_copy
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.state import ARC_LENGTH
 from railsim.kernels.system import FORCE, MOMENT, System
@@ -217,7 +217,7 @@ def _on_twisted_frames(system: System, heights: Floats) -> System:
         s = POSITION + system.frame_offset[system.bodies.frame[body]]
         cell = int((s - system.track.s_start) / system.track.ds)
         coefficients[cell, PHI, 0] = np.arcsin(height / system.track.rail_base)
-    return system._replace(track=system.track._replace(coefficients=aligned(coefficients)))
+    return system._replace(track=system.track._replace(coefficients=aligned_copy(coefficients)))
 
 
 def _loads(solver: SteadyRolling, held: bool, *, on_cant: bool = False) -> Floats:

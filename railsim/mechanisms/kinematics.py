@@ -164,7 +164,7 @@ def _track(model: Model, s: Floats, pose: Floats, arc_start: Integers) -> _Track
     q, q1, q2 = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     arcs = np.zeros((len(s), len(linkage.joint)), dtype=np.int64)
     failure = np.zeros(2)
-    status, valid = motion_kernel.track(linkage, s, pose, arc_start, q, q1, q2, arcs, failure)
+    status, valid = motion_kernel.trace(linkage, s, pose, arc_start, q, q1, q2, arcs, failure)
     return _Tracked(status, valid, q, q1, q2, arcs, failure)
 
 

@@ -27,7 +27,7 @@ from railsim.definitions.track.support import Support as SupportDefinition
 from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, Faults, ModelError, changed_faults, input_error
-from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
+from railsim.kernels.alignment import CACHE_LINE, aligned_copy, aligned_zeros
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.state import N_SCALARS, contact_begin, internal_begin, velocity_begin
 from railsim.kernels.status import LAW_NOT_FINITE, NOT_FINITE, STATUS
@@ -265,7 +265,7 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
         kind=kinds,
         frame=np.array([offsets.index(position) for position in positions], dtype=np.int64),
         parent=np.array(parents, dtype=np.int64),
-        row=aligned(np.array([_body_row(body) for body in flat.bodies])),
+        row=aligned_copy(np.array([_body_row(body) for body in flat.bodies])),
         whole=np.flatnonzero(kinds != AXLEBOX),
         axleboxes=np.flatnonzero(kinds == AXLEBOX),
         fixed=np.flatnonzero(kinds == FIXED),
@@ -297,7 +297,7 @@ def side_by_side(tables: Sequence[Floats]) -> Floats:
     if len(tables) > 1:
         values = np.stack(tables, out=aligned_zeros((len(tables), *tables[0].shape)))
     elif (values := tables[0][None]).ctypes.data % CACHE_LINE:
-        values = aligned(values)
+        values = aligned_copy(values)
     values.setflags(write=False)  # as on disk
     return values
 

@@ -6,10 +6,10 @@ from railsim.contact.creep import creep_law
 from railsim.definitions import Settings, Track
 from railsim.definitions.vehicle.laws import LawUse
 from railsim.errors import input_error, nearest
-from railsim.kernels.creep import OWN
-from railsim.kernels.own_laws import CREEP_GIVES, CREEP_TAKES, FRICTION_GIVES, FRICTION_TAKES
+from railsim.kernels.creep import USER
 from railsim.kernels.patches import CreepLaw
 from railsim.kernels.system import Contact
+from railsim.kernels.user_laws import CREEP_INPUTS, CREEP_RESULTS, FRICTION_INPUTS, FRICTION_RESULTS
 from railsim.laws.binding import CREEP_LAW, FRICTION_LAW, Bound, Takes, bind
 
 
@@ -36,12 +36,12 @@ def with_own_laws(contact: Contact, settings: Settings) -> Contact:
     """
     if settings.own_creep_law is not None:
         bound, values = _bound(settings, settings.own_creep_law, "own_creep_law", CREEP_LAW)
-        block = np.array([0.0] * (CREEP_GIVES + CREEP_TAKES) + values)
-        law = contact.law._replace(number=OWN, own=bound.address, block=block)
+        block = np.array([0.0] * (CREEP_RESULTS + CREEP_INPUTS) + values)
+        law = contact.law._replace(number=USER, user_law=bound.address, block=block)
         contact = contact._replace(law=law)
     if settings.own_friction is not None:
         bound, values = _bound(settings, settings.own_friction, "own_friction", FRICTION_LAW)
-        block = np.array([0.0] * (FRICTION_GIVES + FRICTION_TAKES) + values)
+        block = np.array([0.0] * (FRICTION_RESULTS + FRICTION_INPUTS) + values)
         contact = contact._replace(friction_law=bound.address, friction_block=block)
     return contact
 

@@ -18,8 +18,8 @@ from railsim.kernels import actuators as acts
 from railsim.kernels import controllers as kernel
 from railsim.kernels import element_columns as layout
 from railsim.kernels import element_outputs as element
-from railsim.kernels.commands import Controllers, Signals
 from railsim.kernels.contact_columns import W_Q, W_Y
+from railsim.kernels.control_records import Controllers, Signals
 from railsim.laws.binding import Takes, bind
 from railsim.model.assembly import Model
 from railsim.model.element_arrays import SLOT, LawBlocks
@@ -28,10 +28,10 @@ from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED
 OF_POINTS = kernel.POINT_POSITION, kernel.POINT_VELOCITY, kernel.POINT_ACCELERATION
 OF_BODY = dict(zip(BODY_SIGNALS, (*OF_POINTS, kernel.BODY_ANGLE, kernel.BODY_RATE), strict=True))
 OF_RUN = {
-    "speed": kernel.OF_SPEED,
-    "distance": kernel.OF_DISTANCE,
-    "time": kernel.OF_TIME,
-    "speed_change": kernel.OF_CHANGE,
+    "speed": kernel.TRAVEL_SPEED,
+    "distance": kernel.TRAVEL_DISTANCE,
+    "time": kernel.TRAVEL_TIME,
+    "speed_change": kernel.TRAVEL_ACCELERATION,
 }
 OF_ELEMENT = {
     "deflection": element.DEFLECTION,
@@ -85,9 +85,9 @@ class _Wiring:
     def __init__(self, model: Model, vehicle: Vehicle) -> None:
         self._model, self._vehicle = model, vehicle
         self._blocks = LawBlocks()
-        self._blocks.memory = model.system.own.memory.tolist()
-        self._blocks.address = model.system.own.places.tolist()
-        self._acts = model.system.actuators.which.copy()
+        self._blocks.memory = model.system.user_laws.memory.tolist()
+        self._blocks.address = model.system.user_laws.addresses.tolist()
+        self._acts = model.system.actuators.codes.copy()
         self._faults: list[Fault] = []
         self._wires: list[int] = []
         self._commanded: dict[str, str] = {}  # controllers by their actuators
@@ -105,16 +105,16 @@ class _Wiring:
             raise InputError(self._faults)
         system = self._model.system._replace(
             signals=Signals(
-                np.array([row for row, _ in measured], np.int64).reshape(-1, kernel.SIGNAL_WHICH),
+                np.array([row for row, _ in measured], np.int64).reshape(-1, kernel.SIGNAL_CODES),
                 np.array([row for _, row in measured], float).reshape(-1, kernel.SIGNAL_ROW),
             ),
             controllers=Controllers(
-                np.array(which, np.int64).reshape(-1, kernel.CONTROLLER_WHICH),
+                np.array(which, np.int64).reshape(-1, kernel.CONTROLLER_CODES),
                 np.array([one.period for one in controllers.values()], float),
                 np.array(self._wires, np.int64),
             ),
-            own=self._blocks.as_arrays(),
-            actuators=self._model.system.actuators._replace(which=self._acts),
+            user_laws=self._blocks.as_arrays(),
+            actuators=self._model.system.actuators._replace(codes=self._acts),
         )
         index = replace(self._model.index, signals=tuple(signals), controllers=tuple(controllers))
         return replace(self._model, system=system, index=index)
@@ -211,7 +211,7 @@ class _Wiring:
         if controller.law not in laws:
             self._number(tuple(laws), controller.law, f"{key}.law", "law")
         if self._faults:
-            return [0] * kernel.CONTROLLER_WHICH
+            return [0] * kernel.CONTROLLER_CODES
         gives, takes, kept = len(controller.outputs), len(controller.inputs), controller.memory or 0
         given = Takes("a controller", ("time",), tuple(controller.inputs))
         bound = bind(controller.law, laws[controller.law], given, gives, kept)

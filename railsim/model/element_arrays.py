@@ -34,14 +34,14 @@ from railsim.definitions.vehicle.laws import Law
 from railsim.errors import input_error, nearest
 from railsim.kernels import actuators as acts
 from railsim.kernels import element_columns as layout
-from railsim.kernels.aligned import aligned_zeros
-from railsim.kernels.commands import Actuators, Own
-from railsim.kernels.internal import AIR, LAG, MAXWELL, MAXWELL_CURVE, OWN, PAD, Internal
+from railsim.kernels.alignment import aligned_zeros
+from railsim.kernels.control_records import Actuators, UserLaws
+from railsim.kernels.internal import AIR, LAG, MAXWELL, MAXWELL_CURVE, PAD, USER, Internal
 from railsim.kernels.system import Curves, Drives, Links, Loads, Mounts
 from railsim.laws.binding import FORCE_ELEMENT, Bound, bind
 
 LAWS = {"maxwell": MAXWELL, "maxwell_curve": MAXWELL_CURVE, "pad": PAD, "air": AIR}
-LAWS |= {"lag": LAG, "own": OWN}
+LAWS |= {"lag": LAG, "own": USER}
 MODES = {"force": acts.BY_FORCE, "damper": acts.BY_DAMPER, "position": acts.BY_POSITION}
 MODES |= {"law": acts.BY_LAW, "brake": acts.BY_BRAKE}
 ACTIONS = {axis: acts.ALONG + k for k, axis in enumerate(AXES)}
@@ -95,7 +95,7 @@ class LawBlocks:
             raise input_error("vehicle", found, allowed, key=f"elements.{name}.law")
         bound = bind(act.law, laws[act.law], FORCE_ELEMENT)
         values = bound.parameters(f"elements.{name}.parameters", act.parameters)
-        block = [0.0] * (1 + bound.states + acts.LAW_TAKES + bound.states)
+        block = [0.0] * (1 + bound.states + acts.LAW_INPUTS + bound.states)
         return self.law(bound), self.room([*block, *values]), bound.states
 
     def law(self, bound: Bound) -> int:
@@ -104,11 +104,9 @@ class LawBlocks:
             self.address.append(bound.address)
         return self.address.index(bound.address)
 
-    def as_arrays(self) -> Own:
+    def as_arrays(self) -> UserLaws:
         """As arrays."""
-        return Own(
-            places=np.array(self.address, dtype=np.int64), memory=np.array(self.memory, dtype=float)
-        )
+        return UserLaws(np.array(self.address, np.int64), np.array(self.memory, float))
 
 
 @dataclass
@@ -204,7 +202,7 @@ class ElementArrays:
         return {
             "name": element.name,
             "body": self._pair(element),
-            "which": (*of_command, law, block, first, states),
+            "codes": (*of_command, law, block, first, states),
             "row": (*where, *most, act.stiffness, act.damping, act.delay),
         }
 
@@ -282,10 +280,10 @@ class ElementArrays:
                 **_columns(self.drive_rows, float, row=(4,)),
             ),
             "actuators": Actuators(
-                **_columns(self.act_rows, np.int64, body=(2,), which=(acts.WHICH_SIZE,)),
+                **_columns(self.act_rows, np.int64, body=(2,), codes=(acts.CODES_SIZE,)),
                 **_columns(self.act_rows, float, row=(acts.ROW_SIZE,)),
             ),
-            "own": self.own.as_arrays(),
+            "user_laws": self.own.as_arrays(),
         }
 
     def _mounts(self) -> Mounts:
@@ -295,8 +293,8 @@ class ElementArrays:
         return Mounts(
             row=_table(self.mount_rows, layout.MOUNT_COLUMNS, layout.MOUNT_SIZE),
             friction=friction,
-            law=layout.mount_laws(columns["internal"], columns["curve"], columns["flags"]),
-            falling=layout.falling_friction(friction),
+            law=layout.nonlinear_axes(columns["internal"], columns["curve"], columns["flags"]),
+            falling=layout.stribeck_mounts(friction),
             **columns,
         )
 

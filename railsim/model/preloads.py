@@ -10,7 +10,7 @@ import numpy as np
 from railsim.arrays import Flags, Floats
 from railsim.definitions.vehicle.flatten import FlatElement
 from railsim.errors import ModelError
-from railsim.kernels.aligned import aligned
+from railsim.kernels.alignment import aligned_copy
 from railsim.kernels.element_columns import FRICTION, ONE_SIDED
 from railsim.kernels.system import AXLEBOX, RIGID, Links, Mounts, System
 from railsim.model.assembly import Model
@@ -248,8 +248,8 @@ def _with_forces(system: System, forces: Floats) -> System:
 
 def _copies(system: System) -> tuple[Links, Mounts]:
     """Links and mounts whose preloads may be changed."""
-    links, mounts = system.links, system.mounts
-    return links._replace(row=aligned(links.row)), mounts._replace(row=aligned(mounts.row))
+    links = system.links._replace(row=aligned_copy(system.links.row))
+    return links, system.mounts._replace(row=aligned_copy(system.mounts.row))
 
 
 def with_these_preloads(model: Model, tension: Floats, preload: Floats) -> Model:

@@ -19,8 +19,8 @@ import llvmlite.binding
 import numpy as np
 
 from railsim import kernels
-from railsim.kernels.cache import own_folder, store, stored
-from railsim.kernels.lock import alone
+from railsim.kernels.cache import cache_subfolder, load, store
+from railsim.kernels.lock import exclusive
 
 MOST_STORED = 1000
 """Solutions on disk; the older half of more goes."""
@@ -46,9 +46,9 @@ def solution(
     key = hashlib.sha256(f"{program_hash()} {kind} {inputs}".encode()).hexdigest()[:32]
     path = folder / f"{key}.json"
     result: dict[str, Any]
-    if (data := stored(path)) is None:
-        with alone(path.with_suffix(".lock")) if shared else nullcontext():
-            if not shared or (data := stored(path)) is None:  # not by one that was waited for
+    if (data := load(path)) is None:
+        with exclusive(path.with_suffix(".lock")) if shared else nullcontext():
+            if not shared or (data := load(path)) is None:  # not by one that was waited for
                 result = solve()
                 if shared or _new[kind] < MOST_NEW:
                     _new[kind] += not shared
@@ -62,7 +62,7 @@ def solution(
 @cache
 def solutions_folder(cache_folder: str | None) -> Path | None:
     """Folder of the solutions in the cache, looked at once a process."""
-    return own_folder("solutions")
+    return cache_subfolder("solutions")
 
 
 @cache

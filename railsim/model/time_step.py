@@ -17,7 +17,7 @@ from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError
 from railsim.kernels.compiler import entry
 from railsim.kernels.contact_columns import PATCH_ROWS, WHEEL_COLUMNS
-from railsim.kernels.contact_damping import WALKING
+from railsim.kernels.contact_damping import COUPLING_SPEED
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.internal import PAD
@@ -25,14 +25,14 @@ from railsim.kernels.recording import Recorder
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import LAST_STEP, N_SCALARS, SPEED
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import LEARNT, SUPPORT_SIZE, WEIGHT
+from railsim.kernels.support import LMS, STEP_RATIO, SUPPORT_SIZE
 from railsim.kernels.system import (
-    AT_SECTIONS,
     IMPLICIT,
-    PARTS,
-    PER_PART,
+    LATERAL,
+    MAX_PARTS,
+    PART_SHARE,
+    SECTIONS,
     SHARE,
-    SIDEWAYS,
     System,
     Work,
 )
@@ -136,7 +136,7 @@ def empty_recorder(
         wheel=np.zeros((rows, wheelsets, 2, WHEEL_COLUMNS)),
         rail=np.zeros((rows, wheelsets, 2, 2)),
         patch=np.zeros((rows if patches else 0, wheelsets, 2, of_wheel, PATCH_ROWS)),
-        chosen=chosen,
+        selection=chosen,
         element=np.zeros((rows, len(chosen), ELEMENT_COLUMNS)),
     )
 
@@ -163,10 +163,10 @@ def divide_strikes(system: System, work: Work, scheme: int, step: float, speed: 
         how = MASSES._replace(change=MASSES.change * within, at_sections=MASSES.at_sections * fast)
     part = min(longest_part(system, speed), how.part if scheme == FAST else PART_RK4)
     parts = math.ceil(step / part * (1.0 - 1e-9))
-    work.parts[PARTS] = parts if parts > 1 else 0
-    work.watch[SHARE], work.watch[PER_PART] = how.change, how.of_part
-    work.watch[SIDEWAYS], work.watch[AT_SECTIONS] = how.sideways, how.at_sections
-    work.watch[IMPLICIT] = _implicit_share(step)
+    work.counts[MAX_PARTS] = parts if parts > 1 else 0
+    work.stepping[SHARE], work.stepping[PART_SHARE] = how.change, how.of_part
+    work.stepping[LATERAL], work.stepping[SECTIONS] = how.sideways, how.at_sections
+    work.stepping[IMPLICIT] = _implicit_share(step)
 
 
 def _implicit_share(step: float) -> float:
@@ -251,7 +251,7 @@ class Stability:
         if self._within(0, *self._straight, interval / n):
             names = " on ".join(profile.name for profile in self._model.profiles.values())
             cause = f"the contact of {names} is too sharp in flange contact"
-            if (speed := self._straight[1][SPEED]) < WALKING:
+            if (speed := self._straight[1][SPEED]) < COUPLING_SPEED:
                 cause += f", or {speed:g} m/s too slow, with creep forces that stiffen as 1/speed"
         raise ModelError(f"no stable step longer than {SHORTEST_STEP:g} s: {cause}")
 
@@ -328,12 +328,12 @@ def _step_growth(
     """Largest growth rate of the modes of one step of length `h` [1/s]; inf where it fails.
 
     Where `enough` is given, that is returned instead of what surely is smaller, and a lower bound
-    of what surely is larger and more than `SLIGHT` in a step.  `implicit`: see `Work.watch`.
+    of what surely is larger and more than `SLIGHT` in a step.  `implicit`: see `Work.stepping`.
     """
     if scheme == "fast":
         system, state = _after_step(system, state, h)
     arrays = system, work_arrays(system)
-    arrays[1].watch[IMPLICIT] = implicit
+    arrays[1].stepping[IMPLICIT] = implicit
     rest = np.zeros_like(state), np.zeros((3, len(state))), empty_recorder(model, 1)
     one = SCHEMES[scheme], h, Chunk(1, 1, NEVER)
 
@@ -374,7 +374,7 @@ def _after_step(system: System, state: Floats, h: float) -> tuple[System, Floats
     if not system.support.elastic:
         return system, state
     end = len(state) - N_SCALARS
-    state[end - SUPPORT_SIZE * len(system.contact.body) : end][WEIGHT::SUPPORT_SIZE] = 0.5
+    state[end - SUPPORT_SIZE * len(system.contact.body) : end][STEP_RATIO::SUPPORT_SIZE] = 0.5
     return system._replace(contact=system.contact._replace(load=1e6 * system.contact.load)), state
 
 
@@ -429,7 +429,7 @@ def _jacobian(
     moving = np.arange(end)
     if system.support.elastic:
         first = end - SUPPORT_SIZE * len(system.contact.body)
-        moving = moving[(moving < first) | ((moving - first) % SUPPORT_SIZE < LEARNT)]
+        moving = moving[(moving < first) | ((moving - first) % SUPPORT_SIZE < LMS)]
     trials = np.repeat(state[None], moving.size + 1, axis=0)  # the state itself is the first
     changes = step * np.maximum(1.0, np.abs(state[moving]))
     trials[np.arange(1, moving.size + 1), moving] += changes

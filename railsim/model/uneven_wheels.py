@@ -16,7 +16,7 @@ from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.definitions.vehicle.out_of_round import Flat, Sections, Uneven
 from railsim.kernels.contact_table import FLANGE, N_PATCH, TREAD
 from railsim.kernels.system import System
-from railsim.kernels.wheel_surface import FIRST, FIRST_AHEAD, FLAT, N_PHI, N_Y, SURFACE_ROW, WAVE
+from railsim.kernels.wheel_surface import FIRST, FIRST_FLAT, FLAT, N_PHI, N_Y, SURFACE_ROW, WAVE
 from railsim.model.check_rails import CheckRails
 from railsim.model.rail_ranges import RailRanges
 from railsim.profiles.profile import Profile
@@ -46,7 +46,7 @@ class UnevenWheels(NamedTuple):
         found, turn = np.zeros((2, 2)), 2.0 * np.pi
         for side, table in enumerate(self.surface_of[w, :, TREAD]):
             if table >= 0:
-                columns = [FIRST, N_PHI, N_Y, FIRST_AHEAD]
+                columns = [FIRST, N_PHI, N_Y, FIRST_FLAT]
                 first, n, n_y, ahead = self.surface_row[table, columns].astype(int).tolist()
                 values = self.surface[first + n_y // 2 : first + n * n_y : n_y, :2]
                 on_flat = self.flat_ahead[ahead + int(angle % turn / turn * n)] == 0.0

@@ -5,22 +5,22 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.contact.creep import creep_scratch
 from railsim.kernels import system as kernel
-from railsim.kernels.aligned import aligned_zeros
-from railsim.kernels.commands import Controllers, Signals
+from railsim.kernels.alignment import aligned_zeros
 from railsim.kernels.contact_columns import BUMP_SIZE, CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT, RailTables
-from railsim.kernels.controllers import CONTROLLER_WHICH, SIGNAL_ROW, SIGNAL_WHICH
+from railsim.kernels.control_records import Controllers, Signals
+from railsim.kernels.controllers import CONTROLLER_CODES, SIGNAL_CODES, SIGNAL_ROW
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.elements import LAWS_SIZE
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
 from railsim.kernels.rail_parts import COUNT, NODE_WEIGHTS
 from railsim.kernels.rails import (
-    CHANGES,
     COSINE,
     MOTION_SIZE,
     PLANE_SIZE,
     RAIL_SIZE,
-    recorded_against_rails,
+    RATE_CHANGE_SIZE,
+    write_positions_on_rails,
 )
 from railsim.kernels.registers import LANES
 from railsim.kernels.state import N_SCALARS
@@ -29,12 +29,12 @@ from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTabl
 from railsim.kernels.transient import TRANSIENT
 from railsim.kernels.vibration import VIBRATION
 
-# shortest step that has the full tolerance of forces on elastic rails (s), see `Work.watch`
+# shortest step that has the full tolerance of forces on elastic rails (s), see `Work.stepping`
 FULL_TOLERANCE = 1.25e-3
 
-NO_SIGNALS = Signals(np.zeros((0, SIGNAL_WHICH), dtype=np.int64), np.zeros((0, SIGNAL_ROW)))
+NO_SIGNALS = Signals(np.zeros((0, SIGNAL_CODES), dtype=np.int64), np.zeros((0, SIGNAL_ROW)))
 NO_CONTROLLERS = Controllers(
-    np.zeros((0, CONTROLLER_WHICH), dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int64)
+    np.zeros((0, CONTROLLER_CODES), dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int64)
 )
 CONSTANT_SPEED = kernel.Drive(kernel.CONSTANT, np.zeros((1, 2)), np.zeros(3))
 
@@ -65,13 +65,13 @@ def work_arrays(system: kernel.System) -> kernel.Work:
         laws=aligned_zeros(LAWS_SIZE),
         decay=aligned_zeros(len(system.internal.kind)),
         contact_jacobian=aligned_zeros((n, CONTACT_JACOBIAN)),
-        coupled=aligned_zeros((5, 8)),
+        slip_matrix=aligned_zeros((5, 8)),
         plane=smooth_planes(n_wheelsets),
         rail=aligned_zeros((n_wheelsets, 2, RAIL_SIZE)),
         rail_motion=aligned_zeros((n_wheelsets, 2, MOTION_SIZE)),
         rail_cell=aligned_zeros(n_wheelsets, np.int64),
         rail_u=aligned_zeros(n_wheelsets),
-        above=aligned_zeros(10),
+        wheelset=aligned_zeros(10),
         look_up=aligned_zeros((of_wheel + 1) * LOOK_UP_SIZE),
         weights=aligned_zeros(N_WEIGHT + NODE_WEIGHTS),
         stiffness=aligned_zeros(2 * of_wheel),
@@ -87,16 +87,16 @@ def work_arrays(system: kernel.System) -> kernel.Work:
         events=aligned_zeros((n_wheelsets, kernel.N_EVENTS), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
         force_rate=aligned_zeros(n_wheelsets),
-        watch=np.array([0.0, np.inf, 1.0, FULL_TOLERANCE, np.nan, 1.0, 0.0, 1.0]),
-        rate_change=aligned_zeros((2, CHANGES)),
-        parts=aligned_zeros(kernel.N_PARTS, np.int64),
+        stepping=np.array([0.0, np.inf, 1.0, FULL_TOLERANCE, np.nan, 1.0, 0.0, 1.0]),
+        rate_change=aligned_zeros((2, RATE_CHANGE_SIZE)),
+        counts=aligned_zeros(kernel.N_COUNTS, np.int64),
         extremes=no_extremes(n_wheelsets),
-        present=aligned_zeros(EXTREMES),
+        current=aligned_zeros(EXTREMES),
         unloaded=aligned_zeros((n_wheelsets, 2)),
         transient=aligned_zeros((n_wheelsets * system.contact.transient, 2, TRACED, TRANSIENT)),
         bump=aligned_zeros((of_wheel, BUMP_SIZE)),
         decay_part=aligned_zeros(len(system.internal.kind)),
-        memory=system.own.memory.copy(),
+        memory=system.user_laws.memory.copy(),
         element=np.zeros((1, ELEMENT_COLUMNS)),
     )
 
@@ -168,7 +168,7 @@ def against_rails(system: kernel.System, state: Floats, rail: Floats | None = No
     """
     axles = system.contact.body
     found = np.empty((len(state), len(axles), 2))
-    recorded_against_rails(
+    write_positions_on_rails(
         system.track,
         axles,
         system.frame_offset[system.bodies.frame[axles]],

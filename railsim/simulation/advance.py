@@ -37,7 +37,7 @@ ROUND_OFF = 1e-9  # s
 
 # what a chunk changes in the work arrays: counts of patches and of steps, extremes, times without
 # load, vibrations, commands and samples; and where the rails have been displaced
-COUNTED = ("events", "extremes", "unloaded", "vibration", "parts", "memory", "rail_motion")
+COUNTED = ("events", "extremes", "unloaded", "vibration", "counts", "memory", "rail_motion")
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Preparation:
     end_time: float  # where the run ends [s]
     end_distance: float  # where it ends if that comes first [m]
     steps: StepChoice  # step and output interval at any speed
-    # commands, samples and memory of laws at the beginning, see `railsim.kernels.system.Own`
+    # commands, samples and memory of laws at the beginning, see `railsim.kernels.control_records`
     memory: Floats
     evaluation: float = 0.0  # time from which on peaks are evaluated [s]
     fresh: bool = True  # whether nothing was before the initial state

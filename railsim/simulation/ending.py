@@ -8,7 +8,7 @@ import time
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.state import TIME
 from railsim.kernels.status import DERAILED, LAW_NOT_FINITE, ROLL_RANGE, STATUS, WHEEL_LIFT
-from railsim.kernels.system import AGAIN, DIVIDED, EVALUATIONS, STEPS
+from railsim.kernels.system import DIVIDED_STEPS, EVALUATIONS, REPEATS, STEPS
 from railsim.notation import ROLL, Z
 from railsim.result import Result
 from railsim.result.hunting import hunting
@@ -53,10 +53,10 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: TakenUp | None) -> R
         "cpu_time": run.cpu_time,
         "patches_evaluated": int(run.events[0]),
         "patches_out_of_range": int(run.events[1]),
-        "steps": int(run.work.parts[STEPS]),
-        "steps_divided": int(run.work.parts[DIVIDED]),
-        "evaluations": int(run.work.parts[EVALUATIONS]),
-        "contacts_evaluated_again": int(run.work.events[:, AGAIN].sum()),
+        "steps": int(run.work.counts[STEPS]),
+        "steps_divided": int(run.work.counts[DIVIDED_STEPS]),
+        "evaluations": int(run.work.counts[EVALUATIONS]),
+        "contacts_evaluated_again": int(run.work.events[:, REPEATS].sum()),
         "real_time_factor": simulated / run.cpu_time if run.cpu_time > 0.0 else math.inf,
     }
     Q0, groups = prepared.balance.Q0, {"state": {"end": run.state}}

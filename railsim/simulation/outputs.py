@@ -13,7 +13,7 @@ from railsim.kernels import element_outputs as element
 from railsim.kernels import extremes as seen
 from railsim.kernels.actuators import ACTION, AXLE
 from railsim.kernels.controllers import ACTUATOR
-from railsim.kernels.driving import recorded_axle_torques
+from railsim.kernels.driving import write_axle_torques
 from railsim.kernels.recording import Recorder
 from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
@@ -181,7 +181,7 @@ class OutputPlan:
         }
         self.elements = tuple(name for name in known if matches(name, self._outputs.elements))
         # torques of actuators about axles are recorded beyond the elements that are asked for
-        on_axles = np.flatnonzero(model.system.actuators.which[:, ACTION] == AXLE)
+        on_axles = np.flatnonzero(model.system.actuators.codes[:, ACTION] == AXLE)
         self._on_axles = on_axles if self._outputs.drives else on_axles[:0]
         chosen = [known[name] for name in self.elements]
         self._chosen = np.array([*chosen, *((ACTUATOR, i) for i in self._on_axles)], dtype=np.int64)
@@ -229,7 +229,7 @@ class OutputPlan:
         """Torques of drives, brakes and actuators on each wheelset, forwards positive [N m]."""
         system = self._model.system
         every = np.empty((rows, self._model.index.n_bodies))
-        recorded_axle_torques(
+        write_axle_torques(
             system.drives, system.frame_offset, system.bodies, recorder.state[:rows], every
         )
         torque = every[:, system.contact.body]

@@ -11,7 +11,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import argument_error, listed
-from railsim.kernels.controllers import START
+from railsim.kernels.controllers import RUN_START
 from railsim.kernels.state import TIME
 from railsim.model.assembly import Model, assemble
 from railsim.model.control import periods, with_control
@@ -83,8 +83,8 @@ def prepare(
     else:
         state = _check_length(before.motion, model.n_state)
     model = with_control(model, vehicle, settings)
-    memory = model.system.own.memory.copy()
-    memory[START] = state[TIME]
+    memory = model.system.user_laws.memory.copy()
+    memory[RUN_START] = state[TIME]
     if before is not None and before.memory is not None:
         memory = _check_length(before.memory, len(memory))
     prepared = Preparation(

@@ -15,8 +15,8 @@ from railsim.arrays import Floats, first_largest
 from railsim.contact.table import TableGrid
 from railsim.kernels.actuators import ABOUT, ACTION, BY_DAMPER, COMMAND, LARGEST, MODE
 from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
-from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
-from railsim.kernels.system import DIVIDED, UNSETTLED, Support, System
+from railsim.kernels.support import FORCE_TOLERANCE, MAX_CORRECTIONS
+from railsim.kernels.system import DIVIDED_STEPS, UNSETTLED_RAILS, Support, System
 from railsim.kernels.vibration import (
     ALTERNATES_AT,
     ALTERNATION,
@@ -99,7 +99,7 @@ def run_remarks(run: Run, swings: Hunting | None, seen: Result) -> tuple[str, ..
                 elastic=bool(support.elastic),
             ),
         ),
-        alternation(run.work.vibration, Q0, wheelsets, int(run.work.parts[DIVIDED])),
+        alternation(run.work.vibration, Q0, wheelsets, int(run.work.counts[DIVIDED_STEPS])),
         commanded_dampers(
             model.system, model.index.actuators, run.work.memory, prepared.steps.smallest
         ),
@@ -111,7 +111,7 @@ def run_remarks(run: Run, swings: Hunting | None, seen: Result) -> tuple[str, ..
         ),
         creep_range(int(run.events[1]), int(run.events[0])),
         yaw_range(int(run.events[2]), float(np.sqrt(model.rails.arrays.w[-1]))),
-        unsettled_rails(int(run.work.parts[UNSETTLED])),
+        unsettled_rails(int(run.work.counts[UNSETTLED_RAILS])),
         uneven_wheels_on(support) if uneven else "",
     ]
     return tuple(dict.fromkeys(filter(None, found)))
@@ -212,8 +212,8 @@ def unsettled_rails(evaluations: int) -> str:
         return ""
     return (
         f"In {_evaluations(evaluations)} the forces between wheels and elastic rails used all "
-        f"{MOST_CORRECTIONS} iterations and may not have converged; their error may exceed "
-        f"{SETTLED:.2%} of the static wheel load: --check-step shows whether that matters."
+        f"{MAX_CORRECTIONS} iterations and may not have converged; their error may exceed "
+        f"{FORCE_TOLERANCE:.2%} of the static wheel load: --check-step shows whether that matters."
     )
 
 
@@ -282,11 +282,11 @@ def alternation(vibrations: Floats, Q0: Floats, wheelsets: Sequence[str], divide
 def commanded_dampers(system: System, names: Sequence[str], memory: Floats, step: float) -> str:
     """Remark on a damper with a command too large for the step [s], chosen without commands."""
     acts, bodies = system.actuators, system.bodies
-    for i in np.flatnonzero(acts.which[:, MODE] == BY_DAMPER).tolist():
-        about, of, unit = acts.which[i, ACTION] - ABOUT, bodies.mass, "N s/m"
+    for i in np.flatnonzero(acts.codes[:, MODE] == BY_DAMPER).tolist():
+        about, of, unit = acts.codes[i, ACTION] - ABOUT, bodies.mass, "N s/m"
         if about >= 0:  # x, y, z or an axle
             of, unit = bodies.inertia[:, (0, 1, 2, 1)[about]], "N m s"
-        constant = memory[acts.which[i, COMMAND] + LARGEST]
+        constant = memory[acts.codes[i, COMMAND] + LARGEST]
         if step * constant > COMMANDED * of[acts.body[i]].min():
             return (
                 f"The damper {names[i]} was commanded up to {constant:.3g} {unit}. The step "

@@ -31,12 +31,12 @@ from railsim.definitions.track.definition import Track
 from railsim.errors import InputError, ModelError, argument_error
 from railsim.kernels.internal import PAD
 from railsim.kernels.rails import (
-    ASIDE,
-    ASIDE_SLOPE,
     MIDDLE_Y,
     MIDDLE_Z,
     ROLL,
     ROLL_SLOPE,
+    SHIFT,
+    SHIFT_SLOPE,
     SINE,
     SLOPE_Y,
     SLOPE_Z,
@@ -222,7 +222,7 @@ def _is_displaced(model: Model, start: float) -> bool:
         return False
     work = _rails_at(model, start)
     moved = [MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, SINE, ROLL_SLOPE]
-    return bool(work.plane[:, moved].any() or work.rail[:, :, ASIDE : ASIDE_SLOPE + 1].any())
+    return bool(work.plane[:, moved].any() or work.rail[:, :, SHIFT : SHIFT_SLOPE + 1].any())
 
 
 def _way_from_constant(

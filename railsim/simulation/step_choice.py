@@ -26,7 +26,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import ModelError, input_error
 from railsim.kernels.actuators import BY_BRAKE, LIMIT, MODE
 from railsim.kernels.check_rails import DAMPING, STIFFNESS
-from railsim.kernels.driving import BRAKES_FULLY, OF_ROLLING
+from railsim.kernels.driving import FULL_BRAKE_SPEED, ROLLING_SHARE
 from railsim.kernels.element_columns import LINK_COLUMNS
 from railsim.kernels.rhs import STANDSTILL_SPEED
 from railsim.kernels.system import BRAKES, RADIUS, SLIP_BEGIN, SLIP_END, Bodies, Drives, System
@@ -119,7 +119,7 @@ class StepChoice:
         if self._settings.step is None:
             elastic = bool(self._model.system.support.elastic)
             waves = self._model.wheels.longest_step(speed, self._wave, elastic=elastic)
-            braked = self._braked * min(1.0, OF_ROLLING * speed / BRAKES_FULLY)
+            braked = self._braked * min(1.0, ROLLING_SHARE * speed / FULL_BRAKE_SPEED)
             longest = min(longest, waves, self._guided, braked, self._slipping * speed)
         longest = min(longest, *self._periods, longest)
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
@@ -326,11 +326,11 @@ def braked_step(system: System) -> float:
     for e, w in enumerate(drives.body[:, 1]):
         torque[w] += max(0.0, -_torques(drives, e).min())
     acts, contact = system.actuators, system.contact
-    for i in np.flatnonzero(acts.which[:, MODE] == BY_BRAKE):
+    for i in np.flatnonzero(acts.codes[:, MODE] == BY_BRAKE):
         w = acts.body[i, 1]
         dry = DRY * 2.0 * contact.load[contact.body == w].sum() * bodies.row[w, RADIUS]
         torque[w] += min(acts.row[i, LIMIT], dry)
-    return _held_step(bodies, torque / BRAKES_FULLY)
+    return _held_step(bodies, torque / FULL_BRAKE_SPEED)
 
 
 def slip_control_step(system: System) -> float:

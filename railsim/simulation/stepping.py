@@ -19,7 +19,7 @@ from railsim.arrays import Floats
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import check_types
 from railsim.errors import argument_error, nearest
-from railsim.kernels.actuators import COMMAND, send
+from railsim.kernels.actuators import COMMAND, send_command
 from railsim.kernels.controllers import BASE, VALUE
 from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.status import RUNNING
@@ -360,9 +360,9 @@ class Simulation:
             raise argument_error("value", f"found {value!r} for '{actuator}'", "a finite number")
         run, number = self._run, self.actuators.index(actuator)
         memory = run.work.memory
-        if value == memory[run.system.actuators.which[number, COMMAND]]:
+        if value == memory[run.system.actuators.codes[number, COMMAND]]:
             return
-        plain = getattr(send, "py_func", send)
+        plain = getattr(send_command, "py_func", send_command)
         if not plain(run.system.actuators, memory, number, float(value), self.time):
             found = "more commands than one every 0.25 ms are on their way"
             raise argument_error("actuator", found, "fewer commands", actuator)
@@ -411,7 +411,7 @@ class Simulation:
         if name == "Q0":  # which has no dimension of time
             return self._run.prepared.balance.Q0.copy()
         if name in signals:
-            base = self._run.system.signals.which[signals.index(name), BASE]
+            base = self._run.system.signals.codes[signals.index(name), BASE]
             return float(self._probe[0].memory[base + VALUE])
         if name in values:
             value = np.asarray(values[name])

@@ -17,7 +17,7 @@ from railsim.errors import ModelError
 from railsim.kernels.contact_columns import W_Y
 from railsim.kernels.state import TIME
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import PARTS, TABLE, Drive, System
+from railsim.kernels.system import MAX_PARTS, TABLE, Drive, System
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import POSITION
 from railsim.linear.eigenmodes import Eigenmodes
@@ -146,7 +146,7 @@ class VehicleMotion:
             try:
                 return self._stretch(state, begin, end, duration)
             finally:
-                self._work.parts[PARTS] = 0
+                self._work.counts[MAX_PARTS] = 0
 
     def _stretch(self, state: Floats, begin: float, end: float, duration: float) -> Stretch:
         parts: list[Stretch] = []

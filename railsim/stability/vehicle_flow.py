@@ -13,7 +13,7 @@ import numpy as np
 
 from railsim.arrays import Floats, Integers
 from railsim.kernels.state import SPEED, drive_begin, internal_begin, smoothed_begin
-from railsim.kernels.support import DOF, LEARNT
+from railsim.kernels.support import DOF, LMS
 from railsim.kernels.time_loop import Chunk
 from railsim.linear.circle import POSITION
 from railsim.model.equilibrium import tracks_under
@@ -59,7 +59,7 @@ class VehicleFlow:
         found += [(drive_begin(n, m) + i, DRIVE) for i in range(m)]
         if system.support.elastic:
             # what slopes have learnt is no motion: a period begins without
-            tracks = tracks_under(system, np.arange(float(model.n_state)))[:, :LEARNT]
+            tracks = tracks_under(system, np.arange(float(model.n_state)))[:, :LMS]
             found += [(int(k), OF_TRACK[i // DOF]) for row in tracks for i, k in enumerate(row)]
         indices, floors = zip(*found, strict=True)
         return np.array(indices, dtype=np.int64), np.array(floors)

@@ -15,7 +15,7 @@ from railsim.arrays import Floats
 from railsim.definitions import Track
 from railsim.definitions.excitations.base import Displacement
 from railsim.errors import input_error
-from railsim.kernels.aligned import aligned_zeros
+from railsim.kernels.alignment import aligned_zeros
 from railsim.kernels.track_frame import TrackTables
 from railsim.track.alignment import Alignment, alignment_of
 from railsim.track.irregularity import displacement, shortest_length

@@ -30,7 +30,7 @@ import railsim.studies.case
 from railsim.cli import main
 from railsim.errors import InputError, ModelError
 from railsim.kernels import FASTMATH
-from railsim.kernels.compiler import compiled_by
+from railsim.kernels.compiler import compile_kernel
 from railsim.simulation import first_start
 from railsim.studies import execute
 from railsim.studies.case import load_case
@@ -639,7 +639,7 @@ def test_compiled_code_is_seen(tmp_path, monkeypatch):
         pass
 
     def seen(folder):
-        monkeypatch.setattr(first_start, "time_loop", compiled_by(time_loop, folder, FASTMATH))
+        monkeypatch.setattr(first_start, "time_loop", compile_kernel(time_loop, folder, FASTMATH))
         return first_start.is_compiled()
 
     railsim.simulate(railsim.load_vehicle(COACH), railsim.load_track(STRAIGHT), speed=20.0, until=1)

@@ -17,7 +17,7 @@ from railsim.contact.kalker import (
     kalker_coefficients,
 )
 from railsim.errors import ModelError
-from railsim.kernels.fastsim import kalker_lookup
+from railsim.kernels.fastsim import look_up_kalker
 from railsim.kernels.patches import Patches
 
 
@@ -57,7 +57,7 @@ def test_lookup_of_the_time_loop_follows_the_coefficients():
     ratio = np.geomspace(1 / 23.9, 23.9, 997)
     b = 5e-3 / np.sqrt(ratio)
     patches = ellipses(ratio * b, b)
-    kalker_lookup(ratio.size, patches, creep_tables(0.28))
+    look_up_kalker(ratio.size, patches, creep_tables(0.28))
     assert not patches.outside.any()
     out = np.array(patches[3:7])
     exact = np.array(kalker_coefficients(ratio, 0.28))
@@ -71,7 +71,7 @@ def test_lookup_keeps_the_end_values_beyond_its_range_and_takes_empty_patches():
     b = np.array([1e-3, 1e3, 0.0])
     patches = ellipses(a, b)
     table = creep_tables(0.28)
-    kalker_lookup(3, patches, table)
+    look_up_kalker(3, patches, table)
     out = np.array(patches[3:7])
     np.testing.assert_array_equal(patches.outside, (1.0, 1.0, 0.0))
     np.testing.assert_allclose(out[:, 0], table[-1], rtol=1e-12)

@@ -35,7 +35,7 @@ def test_damaged_files_are_left_out(tmp_path):
         path = tmp_path / f"{seed}.nbc"
         cache.store(path, data)
         path.write_bytes(bytes_damaged(path.read_bytes(), np.random.default_rng(seed)))
-        found = cache.stored(path)
+        found = cache.load(path)
         assert found in (None, data), seed
         assert path.exists() == (found is not None)  # a damaged file is made anew
         return "lost" if found is None else "kept"
@@ -49,9 +49,9 @@ def test_link_and_pipe_are_no_cache(tmp_path):
     cache.store(tmp_path / "real", b"data")
     (tmp_path / "link").symlink_to(tmp_path / "real")
     os.mkfifo(tmp_path / "pipe")
-    assert cache.stored(tmp_path / "real") == b"data"
-    assert cache.stored(tmp_path / "link") is None
-    assert cache.stored(tmp_path / "pipe") is None
+    assert cache.load(tmp_path / "real") == b"data"
+    assert cache.load(tmp_path / "link") is None
+    assert cache.load(tmp_path / "pipe") is None
 
 
 def test_full_disk_costs_nothing_but_time(tmp_path, monkeypatch):
@@ -105,7 +105,7 @@ def test_folders_of_others_are_neither_removed_nor_changed(name, tmp_path, monke
 
 
 def test_code_of_sources_unused_for_a_month_is_removed(variable):
-    recent, old, full = (cache.own_folder("kernels", 16 * digit) for digit in "123")
+    recent, old, full = (cache.cache_subfolder("kernels", 16 * digit) for digit in "123")
     for folder in (recent, old, full):
         (folder / "plain" / "rhs_1").mkdir(parents=True)
         for name in ("rhs.step-1.nbc", "rhs.step-2.nbc1.part", "plain/rhs_1/rhs.step.nbi"):
@@ -137,7 +137,7 @@ def test_folder_of_that_name_with_other_files_is_not_taken_for_the_cache(variabl
     (variable / "railsim" / "kernels").mkdir(parents=True)
     (variable / "railsim" / "README.md").touch()
     before = tree(variable)
-    assert cache.own_folder("kernels", 16 * "0") is None
+    assert cache.cache_subfolder("kernels", 16 * "0") is None
     assert tree(variable) == before
     (said,) = cache.notices
     assert "is not a cache of railsim's; choose another folder by RAILSIM_CACHE_DIR" in said
@@ -146,7 +146,7 @@ def test_folder_of_that_name_with_other_files_is_not_taken_for_the_cache(variabl
 def test_every_missing_folder_is_made_for_its_user_only(variable):
     before = os.umask(0o002)
     try:
-        folder = cache.own_folder("kernels", 16 * "0")
+        folder = cache.cache_subfolder("kernels", 16 * "0")
     finally:
         os.umask(before)
     for path in (variable, variable / "railsim", folder.parent, folder):
@@ -158,10 +158,10 @@ def test_every_missing_folder_is_made_for_its_user_only(variable):
 
 @pytest.mark.parametrize("mode", [0o755, 0o775, 0o777, 0o2775])
 def test_own_folder_is_put_right(variable, mode):
-    folder = cache.own_folder("kernels", 16 * "0")
+    folder = cache.cache_subfolder("kernels", 16 * "0")
     for path in (folder, folder.parent, folder.parent.parent):
         path.chmod(mode)
-    assert cache.own_folder("kernels", 16 * "0") == folder
+    assert cache.cache_subfolder("kernels", 16 * "0") == folder
     for path in (folder, folder.parent, folder.parent.parent):
         assert path.stat().st_mode & 0o7777 == 0o700
     assert not cache.notices
@@ -192,21 +192,21 @@ def test_shared_primary_group_and_umask_002(tmp_path, monkeypatch):
 def test_folder_above_that_everybody_may_write_to_is_refused(variable):
     variable.mkdir()
     variable.chmod(0o777)
-    assert cache.own_folder("tables") is None
+    assert cache.cache_subfolder("tables") is None
     (said,) = cache.notices
     assert f"other users may write to {variable}" in said
 
 
 def test_cache_of_another_user_is_refused(variable, monkeypatch):
-    folder = cache.own_folder("tables")
+    folder = cache.cache_subfolder("tables")
     cache.store(folder / "code", b"mine")
     if os.geteuid() == 0:
         os.chown(folder / "code", 54321, 54321)
         os.chown(folder, 54321, 54321)
     else:  # only root may give files away
         monkeypatch.setattr(os, "geteuid", lambda: 54321)
-    assert cache.stored(folder / "code") is None
-    assert cache.own_folder("tables") is None
+    assert cache.load(folder / "code") is None
+    assert cache.cache_subfolder("tables") is None
     (said,) = cache.notices
     assert f"{folder} belongs to another user" in said
 
@@ -214,13 +214,13 @@ def test_cache_of_another_user_is_refused(variable, monkeypatch):
 def test_file_that_others_may_write_to_is_not_loaded(tmp_path):
     cache.store(tmp_path / "code", b"data")
     (tmp_path / "code").chmod(0o664)
-    assert cache.stored(tmp_path / "code") is None
+    assert cache.load(tmp_path / "code") is None
     cache.store(tmp_path / "code", b"data")
-    assert cache.stored(tmp_path / "code") == b"data"
+    assert cache.load(tmp_path / "code") == b"data"
 
 
 def test_cache_on_a_read_only_disk_is_used_as_it_is(variable, monkeypatch):
-    folder = cache.own_folder("tables")
+    folder = cache.cache_subfolder("tables")
     cache.store(folder / "code", b"data")
 
     def refused(path, *_, **__):
@@ -230,12 +230,12 @@ def test_cache_on_a_read_only_disk_is_used_as_it_is(variable, monkeypatch):
 
     monkeypatch.setattr(os, "mkdir", refused)
     monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
-    assert cache.own_folder("tables") == folder
-    assert cache.stored(folder / "code") == b"data"
+    assert cache.cache_subfolder("tables") == folder
+    assert cache.load(folder / "code") == b"data"
     cache.store(folder / "new", b"data")
     assert not (folder / "new").exists()
     assert not cache.notices
-    assert cache.own_folder("kernels") is None  # is not there
+    assert cache.cache_subfolder("kernels") is None  # is not there
     (said,) = cache.notices
     assert "Read-only file system" in said
     assert "choose another folder by RAILSIM_CACHE_DIR" in said
@@ -247,7 +247,7 @@ def test_relative_folder_for_caches_is_ignored(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", "caches")
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.chdir(tmp_path)
-    assert cache.own_folder("tables") == tmp_path / ".cache" / "railsim" / "tables"
+    assert cache.cache_subfolder("tables") == tmp_path / ".cache" / "railsim" / "tables"
 
 
 def test_only_the_source_of_the_cache_is_left_out_of_the_hash(tmp_path):

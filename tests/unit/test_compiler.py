@@ -12,14 +12,14 @@ import sys
 import numpy as np
 from railsim.kernels import compiled, compiler
 from railsim.kernels.cube_root import cube_root
-from railsim.kernels.lanes import LANES, eight_from, load_rows, starts, store_rows
+from railsim.kernels.lanes import LANES, lane_numbers, load_rows, row_starts, store_rows
 
 assert compiler.PRIVATE == (sys.argv[1] == "0")
 
 @compiled
 def formula(table, out, n):
     for first in range(0, n, LANES):
-        rows = starts(eight_from(first, n), 3)
+        rows = row_starts(lane_numbers(first, n), 3)
         a, b, c = load_rows(table, rows, 0, 3)
         store_rows(out, rows, 0, (a * b - 2.0 * c, -a / b + 1, (a - b) * c))
 

@@ -42,8 +42,8 @@ def test_rate_and_step_of_a_state_at_constant_drive(kind, begin, drive, plain):
     )
     decay = np.empty(1)
     for h in (1e-4, 3e-3, 0.1):
-        kernel.constant_decays(given, h, decay)
-        found = kernel.advanced(given, CURVES, 0, x, drive, FAST, h, decay[0])
+        kernel.set_decays(given, h, decay)
+        found = kernel.state_after(given, CURVES, 0, x, drive, FAST, h, decay[0])
         exact = solve_ivp(
             lambda _, y: [rate(y[0], drive, FAST)], (0.0, h), [x], rtol=1e-8, atol=1e-9,
             method="LSODA",
@@ -58,7 +58,7 @@ def test_pads_return_to_their_limits_each_in_its_own_way(plain):
     state, drive = np.array([9.0, -7e3, 3e3, 4e3, 8e3]), np.full((4, 2), 1e3)
     for module in (kernel, step_rk4):
         plain(module)
-    step_rk4.settle_limits(given, CURVES, 1, drive, state)
+    step_rk4.restore_limits(given, CURVES, 1, drive, state)
     assert state == pytest.approx([9.0, -1e3, 0.6e3, 0.8e3, 8e3])
 
 
@@ -71,13 +71,13 @@ def test_a_wedge_slides_back_to_its_limit_along_the_gradient_of_its_stiffness(sk
     trial, drive = np.array([2.5e3, -3e3, 4e3]), np.stack([np.zeros(3), limits], axis=1)
     plain(kernel)
     state = np.array([7.0, *trial])
-    kernel.hold_within(given, 2, 1, drive, state)
+    kernel.return_to_limit(given, 2, 1, drive, state)
     q = state[1:] / limits
     assert np.linalg.norm(q) - skew * q[2] == pytest.approx(1.0)
     slip = (trial / state[1:] - 1.0) * limits**2 / stiffness
     assert slip == pytest.approx(np.full(3, slip[0]), rel=1e-6)
     held = state.copy()
-    kernel.hold_within(given, 2, 1, drive, state)  # nothing is left to slide
+    kernel.return_to_limit(given, 2, 1, drive, state)  # nothing is left to slide
     assert state == pytest.approx(held)
 
 

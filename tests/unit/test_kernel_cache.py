@@ -123,12 +123,12 @@ def test_code_compiled_in_another_way_is_other_code(monkeypatch, tmp_path, name,
 def test_lock_whose_file_was_removed_is_no_lock(tmp_path):
     """Who waited for the removed file does not go on beside the holder of the next one."""
     path = tmp_path / "tables.lock"
-    first = lock._locked(path)
+    first = lock._acquire(path)
     with ThreadPoolExecutor(1) as threads:
-        waiting = threads.submit(lock._locked, path)
+        waiting = threads.submit(lock._acquire, path)
         time.sleep(2.0 * lock.POLL)  # it has opened the file
         path.unlink()
-        second = lock._locked(path)
+        second = lock._acquire(path)
         os.close(first)
         time.sleep(3.0 * lock.POLL)
         assert not waiting.done()

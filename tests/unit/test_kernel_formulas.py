@@ -31,7 +31,7 @@ from railsim.kernels import (
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
-    B_ACROSS,
+    B_E_Y,
     B_HEIGHT,
     BUMP_SIZE,
     C11,
@@ -46,7 +46,7 @@ from railsim.kernels.contact_columns import (
     FOOT_Z,
     J_NORMAL,
     J_SECANT,
-    J_SECANT_LEVER,
+    J_SECANT_C_Z,
     J_SECANT_YAW,
     J_SLIP,
     NORMAL_Y,
@@ -60,8 +60,8 @@ from railsim.kernels.contact_columns import (
     SLOPE_ALONG,
     T_X,
     T_Y,
-    TURN_Y,
-    TURN_Z,
+    TANGENT_Y,
+    TANGENT_Z,
     XI_X,
     XI_Y,
 )
@@ -78,7 +78,6 @@ from railsim.kernels.contact_table import (
 )
 from railsim.kernels.internal import PAD
 from railsim.kernels.rails import (
-    ASIDE,
     COSINE,
     MIDDLE_Y,
     MIDDLE_Z,
@@ -87,6 +86,7 @@ from railsim.kernels.rails import (
     RAIL_SLOPE,
     ROLL,
     ROLL_SLOPE,
+    SHIFT,
     SINE,
     SLOPE_Z,
 )
@@ -112,7 +112,7 @@ from railsim.kernels.track_frame import PHI as CANT_ANGLE
 
 @pytest.mark.parametrize("h", [1e-4, 1e-3, 8e-3])
 def test_high_pass_of_the_wheel_loads_is_that_of_scipy(h):
-    b0, a1, a2, fading = vibration.high_pass.py_func(h)
+    b0, a1, a2, fading = vibration.high_pass_coefficients.py_func(h)
     zeros, poles = butter(2, 40.0, "highpass", fs=1.0 / h)
     assert [b0, -2.0 * b0, b0] == pytest.approx(zeros, rel=1e-10)
     assert [1.0, a1, a2] == pytest.approx(poles, rel=1e-10)
@@ -141,7 +141,7 @@ def test_moment_of_a_bushing_is_the_gradient_of_its_potential(plain):
 
     plain(elements)
     axes = R1.as_matrix(), R2.as_matrix()
-    angle, rate, moment = elements.rotation_law(
+    angle, rate, moment = elements.rotation_moment(
         axes[0].ravel(), axes[1].ravel(), omega_1, omega_2, (stiffness, damping)
     )
     assert rate == pytest.approx(axes[0].T @ (omega_2 - omega_1))
@@ -162,7 +162,9 @@ def test_friction_of_a_pad_is_at_most_its_coefficients_times_its_load(normal, pl
     plain(elements)
     system, shares = Record(mounts=mounts, internal=internal, curves=None), []
     for inner in random.normal(size=(20, 2)) * mu * 3e3:
-        force = [elements.axis_law(system, work, 0, k, (0.0, 1.0, normal), inner) for k in range(3)]
+        force = [
+            elements.axis_force(system, work, 0, k, (0.0, 1.0, normal), inner) for k in range(3)
+        ]
         assert force[0] == 0.0
         assert force[1] * inner[1] == pytest.approx(force[2] * inner[0])
         shares.append(np.hypot(*(np.array(force[1:]) / (mu * 3e3))))
@@ -234,7 +236,7 @@ def test_what_keeps_axleboxes_upright_does_no_work_along_a_turning_track(seed, p
     work.pose[0, :9] = (track @ axes).flat
     before = work.pose[0].copy()
     plain(rhs)
-    rhs.hold_axleboxes(system, work, state)
+    rhs.remove_axle_moments(system, work, state)
     force, moment = ((work.pose[0] - before)[k : k + 3] @ track for k in (FORCE, MOMENT))
     assert [moment @ yawed[:, 0], moment[2]] == pytest.approx([0.0, 0.0], abs=1e-12)
     assert work.pose[0, MOMENT : MOMENT + 3] @ track @ axes[:, 1] == pytest.approx(0.0, abs=1e-12)
@@ -264,14 +266,14 @@ def test_creepages_are_the_velocity_of_the_wheel_against_the_rail():
         patch_index=index, patch=patch, plane=plane, rail=rail, relative=relative, frames=frames,
         rail_motion=motion,
     )  # fmt: skip
-    creepages.creepages.py_func(system, work, 3, speed, state)
+    creepages.set_creepages.py_func(system, work, 3, speed, state)
     for k, (w, side) in enumerate(index):
         b, slope = system.contact.body[w], rail[w, side, RAIL_SLOPE]
         omega, r = frames[system.bodies.frame[b], OMEGA : OMEGA + 3], place(system.bodies, b, state)
         v, u = state[24:].reshape(-1, 3)[2 * b : 2 * b + 2]
         a = relative[b, :9].reshape(3, 3) @ u
         lean = turn(np.arctan2(plane[w, SINE], plane[w, COSINE]), 0)
-        c, d = patch[[C_X, C_Y, C_Z], k], np.array([1.0, *patch[[TURN_Y, TURN_Z], k]])
+        c, d = patch[[C_X, C_Y, C_Z], k], np.array([1.0, *patch[[TANGENT_Y, TANGENT_Z], k]])
         n = lean @ [0.0, *patch[[ANGLE_SIN, ANGLE_COS], k]]
         assert patch[[NORMAL_Y, NORMAL_Z], k] == pytest.approx(n[1:])
         middle = np.array([0.0, *plane[w, [MIDDLE_Y, MIDDLE_Z]]])
@@ -344,9 +346,9 @@ def test_signals_of_the_track_ahead_are_the_slope_of_its_heading_and_its_cant(pl
     coefficients = np.random.default_rng(1).normal(size=(3, 6, 4))
     which, row = np.zeros((2, 6), dtype=np.int64), np.zeros((2, 8))
     which[:, controllers.KIND] = controllers.CURVATURE, controllers.CANT
-    row[:, controllers.AHEAD_BY] = 2.5
+    row[:, controllers.LOOKAHEAD] = 2.5
     track = TrackTables(1.0, 2.0, coefficients, np.zeros((3, 6, 4)), 0, 1.5)
-    system, state = Record(signals=Record(which=which, row=row), track=track), np.zeros(20)
+    system, state = Record(signals=Record(codes=which, row=row), track=track), np.zeros(20)
     plain(controllers)
     for at, cell, u in ((-1.4, 0, 0.1), (1.2, 1, 0.7), (3.9, 2, 1.4)):
         heading, cant = (np.polynomial.Polynomial(coefficients[cell, k]) for k in (PSI, CANT_ANGLE))
@@ -375,14 +377,14 @@ def test_implicit_damping_of_a_step_solves_its_matrix(h, plain):
     theta = step_fast.implicitness(h * np.trace(inverse @ slip))
     matrix = np.eye(3) + h * inverse @ (theta * slip + 0.5 * normal)
     found = given.copy()
-    step_fast.soften_across(J, 1, found, before, 6, mass, roll, h)
+    step_fast.damp_cross_section(J, 1, found, before, 6, mass, roll, h)
     expected = before[7:10] + np.linalg.solve(matrix, (given - before)[7:10])
     assert found == pytest.approx([*given[:7], *expected, *given[10:]])
     lever, found = np.array([1.0, -0.6]), given.copy()
     inverse = np.diag([mass, roll])
     theta = step_fast.implicitness(h * damping * lever @ inverse @ lever)
     matrix = np.eye(2) + theta * h * damping * inverse @ np.outer(lever, lever)
-    step_fast.soften_slip(found, before, 2, 4, lever[1], damping, mass, roll, h)
+    step_fast.damp_slip(found, before, 2, 4, lever[1], damping, mass, roll, h)
     expected = before[[2, 4]] + np.linalg.solve(matrix, (given - before)[[2, 4]])
     assert found[[2, 4]] == pytest.approx(expected)
 
@@ -405,14 +407,14 @@ def test_implicit_damping_at_walking_pace_solves_the_matrix_of_all_directions(h,
     patch[C22], patch[T_X] = 4.0, [-1.0, 1.0]
     patch[T_Y] = 1e-9
     cross = np.sqrt((secant - along) * (secant - across)) * [1.0, -1.0]
-    work = Record(patch=patch, coupled=np.zeros((5, 8)), patch_index=np.zeros((2, 1), int))
+    work = Record(patch=patch, slip_matrix=np.zeros((5, 8)), patch_index=np.zeros((2, 1), int))
     work.contact_jacobian = np.zeros((2, CONTACT_JACOBIAN))
     system = Record(support=Record(elastic=0), contact=Record(body=[1]))
-    contact_damping.couple_directions(system, work, 2)
+    contact_damping.add_slip_coupling(system, work, 2)
     D, N, J = np.zeros((6, 6)), np.zeros((6, 6)), work.contact_jacobian[1]
     for k, damping in enumerate((0.6, 1.3)):
-        contact_damping.add_damping(work, 1, k, across[k], damping)
-        J[[J_SECANT, J_SECANT_LEVER]] += secant[k], secant[k] * cz
+        contact_damping.add_wheelset_damping(work, 1, k, across[k], damping)
+        J[[J_SECANT, J_SECANT_C_Z]] += secant[k], secant[k] * cz
         J[J_SECANT_YAW] += secant[k] * patch[C_Y, k] ** 2
         s, c, cy = np.sin(angle[k]), np.cos(angle[k]), patch[C_Y, k]
         G = np.array([[1, 0, 0, 0, cz, -cy], [0, c, -s, -c * cz - s * cy, 0, 0]])
@@ -430,7 +432,7 @@ def test_implicit_damping_at_walking_pace_solves_the_matrix_of_all_directions(h,
     matrix = np.eye(6) + h * inverse[:, None] * (np.sqrt(np.outer(theta, theta)) * D + 0.5 * N)
     expected = before[6:] + np.linalg.solve(matrix, (given - before)[6:])
     found = given.copy()
-    step_fast.soften_coupled(Record(row=row), work, 1, found, before, J[J_SECANT], h, h)
+    step_fast.damp_coupled(Record(row=row), work, 1, found, before, J[J_SECANT], h, h)
     assert found == pytest.approx([*given[:6], *expected])
 
 
@@ -441,7 +443,7 @@ def test_a_wheel_beyond_the_tables_of_rails_is_held_at_their_edge(y, roll):
     tables = Record(shear=[0.4], y0=-0.02, dy=1e-3, roll0=-0.012, droll=1e-3)
     tables.values = np.zeros((1, 1, 1, 1, 41, 1))
     stretched, slope = contact_table.stretched_roll(roll)
-    found, found_slope, aside, more = rail_parts.held.py_func(tables, y, roll, stretched, slope)
+    found, found_slope, aside, more = rail_parts.clamp.py_func(tables, y, roll, stretched, slope)
     foot = y - 0.4 * roll
     assert aside == pytest.approx(foot - np.clip(foot, -0.019, 0.019), abs=2e-9)
     assert (more == 0.0) == (abs(stretched) < 0.011)
@@ -460,7 +462,7 @@ def test_slope_of_a_rail_is_that_between_its_nodes_and_stays_where_it_ends(plain
     plain(rail_parts)
 
     def fall(zone, s):
-        return rail_parts.fall_at(rails, 0, zone, s, 7.0, (0, 0, 0), weights)
+        return rail_parts.section_slope(rails, 0, zone, s, 7.0, (0, 0, 0), weights)
 
     given = rails.values[:, 0, 0, 0, 1, 0], rails.values[:, 1, 0, 0, 1, 0]
     assert fall(0, 0.4) == pytest.approx(given[0][1] - given[0][0])
@@ -495,7 +497,7 @@ def test_heights_of_a_wheel_are_scipys_splines_around_and_across():
                 for n in (0, 1)
             )
             expected = e(phi), e(phi, 1), e_y(phi) if inside == at else 0.0
-            found = wheel_surface.surface_at.py_func(surface, 0, phi, at)
+            found = wheel_surface.surface_height.py_func(surface, 0, phi, at)
             np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
@@ -505,13 +507,13 @@ def test_gap_of_a_wheel_that_is_not_round_has_the_slopes_of_its_height():
     shear, x = 0.4, np.array([0.3, -0.2])
 
     def height(x):
-        return wheel_surface.surface_at.py_func(surface, 0, 0.7, x[0] - shear * x[1])
+        return wheel_surface.surface_height.py_func(surface, 0, 0.7, x[0] - shear * x[1])
 
     look_up, bump = np.zeros(LOOK_UP_SIZE + 2), np.zeros((3, BUMP_SIZE))
-    bump[1, B_HEIGHT], _, bump[1, B_ACROSS] = height(x)
+    bump[1, B_HEIGHT], _, bump[1, B_E_Y] = height(x)
     given = 2.0, 0.5, -0.3
     look_up[2 + np.array([0, G_Y, G_ROLL])] = given
-    wheel_surface.raise_gap.py_func(look_up, 2, bump, 1, shear)
+    wheel_surface.subtract_height.py_func(look_up, 2, bump, 1, shear)
     slopes = approx_fprime(x, lambda at: height(at)[0])
     expected = np.subtract(given, [height(x)[0], *slopes])
     assert look_up[2 + np.array([0, G_Y, G_ROLL])] == pytest.approx(expected, abs=1e-6)
@@ -526,18 +528,18 @@ def test_foreseen_height_of_a_wheel_changes_as_the_wheel_turns(plain):
     system = Record(contact=contact, bodies=bodies, frame_offset=[0.0])
     work = Record(plane=np.zeros((1, 16)), rail=np.zeros((1, 2, 8)))
     state, track, speed, aside = np.zeros(40), np.zeros(6), 3.0, np.array([-0.2, 0.3])
-    state[[1, 3]], work.plane[0, ROLL], work.rail[0, :, ASIDE] = [0.5, 0.2], 0.05, aside
+    state[[1, 3]], work.plane[0, ROLL], work.rail[0, :, SHIFT] = [0.5, 0.2], 0.05, aside
     state[velocity_begin(1) + 4] = -speed / 0.46
 
     def heights(t):
         state[ARC_LENGTH] = 1.1 + speed * t
-        wheel_surface.foreseen_heights(system, work, state, 0, track, 0)
+        wheel_surface.predict_tread_heights(system, work, state, 0, track, 0)
         return track[:4].copy()
 
     for module in (rail_parts, wheel_surface):
         plain(module)
     y = np.array([-1.0, 1.0]) * (0.5 - aside - 0.4 * 0.15)
-    expected = [wheel_surface.surface_at(contact, 0, 1.1 / 0.46, at)[0] for at in y]
+    expected = [wheel_surface.surface_height(contact, 0, 1.1 / 0.46, at)[0] for at in y]
     found = heights(0.0)
     assert found[:2] == pytest.approx(expected)
     assert found[2:] == pytest.approx((heights(1e-6) - heights(-1e-6))[:2] / 2e-6, rel=1e-6)
@@ -555,7 +557,7 @@ def test_approaches_of_neighbours_are_those_of_the_penetrations_less_what_they_b
     stiffness = np.concatenate([random.uniform(2e9, 2e10, 3), random.uniform(0.0, 2e10, 3)])
     p, (a, b) = random.uniform(-4e-5, 1e-4, 3), random.uniform(0.0, 4e-10, 2)
     e = p.copy()
-    contact_table.coupled_approaches(np.array([[0.0, 0.0], [a, b]]), 1, stiffness, e)
+    contact_table.couple_approaches(np.array([[0.0, 0.0], [a, b]]), 1, stiffness, e)
     bends = np.array([[0.0, a, 0.0], [a, 0.0, b], [0.0, b, 0.0]])
     left = p - bends @ loads(np.maximum(e, 0.0), stiffness)
     for patch in range(3):
@@ -577,13 +579,17 @@ def test_slopes_of_a_limited_continuation_are_its_derivatives():
         return 0.2 - 0.3 * x[0] + 0.5 * x[1]
 
     def part(x):
-        return contact_table.allowed_part.py_func(there(x), 0.4, -0.7, here(x), -0.3, 0.5)
+        return contact_table.continuation_share.py_func(there(x), 0.4, -0.7, here(x), -0.3, 0.5)
 
     x = np.array([0.1, 0.2])
     share, part_y, part_roll = part(x)
     assert there(x) + share * (here(x) - there(x)) == pytest.approx(0.5 * there(x))
     assert [part_y, part_roll] == pytest.approx(approx_fprime(x, lambda at: part(at)[0]), rel=1e-5)
-    assert contact_table.allowed_part.py_func(3.0, 0.4, -0.7, 2.0, -0.3, 0.5) == (1.0, 0.0, 0.0)
+    assert contact_table.continuation_share.py_func(3.0, 0.4, -0.7, 2.0, -0.3, 0.5) == (
+        1.0,
+        0.0,
+        0.0,
+    )
 
 
 @pytest.mark.parametrize("falls", [(0.9, 0.5), (0.4, 1.1)])
@@ -601,11 +607,11 @@ def test_stiffness_beyond_the_last_node_has_the_slopes_of_what_is_left(falls, pl
 
             out[first + np.array(columns)] = value(x), *approx_fprime(x, value)
 
-    monkeypatch.setattr(contact_table, "_sum_of_nodes", nodes)
+    monkeypatch.setattr(contact_table, "_sum_nodes", nodes)
 
     def fields(x, tw=2.4):
         out = np.ones(2 * LOOK_UP_SIZE)
-        contact_table.continue_limited(x, 0, 0, 0, None, tw, out, LOOK_UP_SIZE)
+        contact_table.sum_nodes_limited(x, 0, 0, 0, None, tw, out, LOOK_UP_SIZE)
         return out[LOOK_UP_SIZE:]
 
     x = np.array([0.1, -0.2])

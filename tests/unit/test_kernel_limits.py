@@ -59,13 +59,13 @@ def test_what_drives_a_mechanism_has_its_own_derivatives(driver, plain):
     def residual(moved):
         Phi, pose = np.zeros(6), q.copy()
         pose[1:] = np.reshape(moved, (2, 3))
-        linkage.drive(given, 0, pose, 0.2, Phi, np.zeros((6, 6)), 5, one, two)
+        linkage.write_driver_row(given, 0, pose, 0.2, Phi, np.zeros((6, 6)), 5, one, two)
         return Phi[5]
 
-    linkage.drive(given, 0, q, 0.2, np.zeros(6), J, 5, one, two)
+    linkage.write_driver_row(given, 0, q, 0.2, np.zeros(6), J, 5, one, two)
     at, way = q[1:].ravel(), v[1:].ravel()
     assert J[5] == pytest.approx(approx_fprime(at, residual), abs=1e-6)
-    linkage.curvature(given, 0, None, q, v, right, one, two)
+    linkage.write_acceleration_side(given, 0, None, q, v, right, one, two)
     h = 1e-4
     second = (residual(at + h * way) - 2.0 * residual(at) + residual(at - h * way)) / h**2
     assert right[5] == pytest.approx(-second, abs=1e-5)

@@ -86,7 +86,7 @@ def test_fields_of_a_patch_are_the_same_without_compilation(tw, plain):
     model = assemble(load_vehicle("coach_manchester"), load_track("straight"), Settings())
     contact = model.system.contact
     weights, out = np.empty(N_WEIGHT), np.zeros((2, 3, LOOK_UP_SIZE))
-    contact_table.cell_weights(contact, 0.3, 0.8, 1.1, weights)
+    contact_table.set_cell_weights(contact, 0.3, 0.8, 1.1, weights)
     w, roll, y = (size // 2 for size in contact.values.shape[2:5])
     for found in out:
         for patch in range(3):

@@ -10,18 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from railsim.kernels import compiled, lanes_plain
-from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
+from railsim.kernels.alignment import CACHE_LINE, aligned_copy, aligned_zeros
 from railsim.kernels.lanes import (
     LANES,
     add_rows,
     add_to_pairs,
-    eight,
-    eight_from,
-    eight_in_pairs,
-    load_few,
+    gather_from,
+    lane_numbers,
+    load_part,
     load_rows,
+    paired_numbers,
+    row_starts,
     square_root,
-    starts,
     store_lanes,
     store_rows,
     where_beyond,
@@ -37,7 +37,7 @@ WIDTH = 11
 def turn(table, out, n):
     """Store the columns of rows in another order, and a sum of two."""
     for first in range(0, n, LANES):
-        rows = starts(eight_from(first, n), WIDTH)
+        rows = row_starts(lane_numbers(first, n), WIDTH)
         a, b, c, d, e = load_rows(table, rows, 1, 5)
         store_rows(out, rows, 2, (e, d, c, b, a, a + 2.0 * b))
 
@@ -46,7 +46,7 @@ def turn(table, out, n):
 def some(x, out, n):
     """Copy `n` numbers, by eights; what is beyond them is 0."""
     for first in range(0, n, LANES):
-        store_lanes(out, first, load_few(x, first, n - first))
+        store_lanes(out, first, load_part(x, first, n - first))
 
 
 @compiled
@@ -55,13 +55,13 @@ def collect(table, one, two, total):
     n = one.shape[0]
     for first in range(0, n, LANES):
         count = min(n - first, LANES)
-        values = load_rows(table, starts(eight_from(first, n), 8), 0, 8)
+        values = load_rows(table, row_starts(lane_numbers(first, n), 8), 0, 8)
         a, b, c, d, e, f, g, h = values
         rest = (1.0 - a, 1.0 - b, 1.0 - c, 1.0 - d, 1.0 - e, 1.0 - f, 1.0 - g, 1.0 - h)
         add_to_pairs(
             total,
-            starts(eight(one, first), 8),
-            starts(eight(two, first), 8),
+            row_starts(gather_from(one, first), 8),
+            row_starts(gather_from(two, first), 8),
             0,
             values,
             rest,
@@ -74,19 +74,19 @@ def collect_three(table, where, total):
     """Add the first three columns of `table` to the rows `where` of `total`."""
     n = where.shape[0]
     for first in range(0, n, LANES):
-        values = load_rows(table, starts(eight_from(first, n), 8), 0, 3)
-        add_rows(total, starts(eight(where, first), 8), 5, values, min(n - first, LANES))
+        values = load_rows(table, row_starts(lane_numbers(first, n), 8), 0, 3)
+        add_rows(total, row_starts(gather_from(where, first), 8), 5, values, min(n - first, LANES))
 
 
 @compiled
 def elementary(x, out):
     """Functions of eight numbers."""
-    rows = starts(eight_from(0, LANES), 1)
+    rows = row_starts(lane_numbers(0, LANES), 1)
     (v,) = load_rows(x, rows, 0, 1)
     s, c = sine_cosine_lanes(v)
     store_rows(
         out,
-        starts(eight_from(0, LANES), 4),
+        row_starts(lane_numbers(0, LANES), 4),
         0,
         (s, c, square_root(v * v), where_beyond(v, 1.0, -v, v / 4.0)),
     )
@@ -125,7 +125,7 @@ def test_numbers_beyond_the_last_one_are_not_read(n):
     end = -(-n // LANES) * LANES
     expected = np.concatenate([x[:n], np.zeros(end - n), np.full(24 - end, -1.0)])
     np.testing.assert_array_equal(out, expected)
-    plain = lanes_plain.load_few(x[:n], n - n % LANES, n % LANES)  # as of an array that ends there
+    plain = lanes_plain.load_part(x[:n], n - n % LANES, n % LANES)  # as of an array that ends there
     np.testing.assert_array_equal(plain[: n % LANES], x[n - n % LANES : n])
     assert not np.any(plain[n % LANES :])
 
@@ -167,12 +167,12 @@ def test_not_a_number_is_beyond_every_limit():
 
 
 def test_two_of_each_pair_stand_side_by_side_and_the_last_pair_fills_up():
-    assert eight_in_pairs.py_func(0, 4) == (0, 1, 2, 3, 4, 5, 6, 7)
-    assert eight_in_pairs.py_func(4, 6) == (8, 9, 10, 11, 10, 11, 10, 11)
+    assert paired_numbers.py_func(0, 4) == (0, 1, 2, 3, 4, 5, 6, 7)
+    assert paired_numbers.py_func(4, 6) == (8, 9, 10, 11, 10, 11, 10, 11)
 
 
 def test_neighbours_of_plain_lanes():
-    np.testing.assert_array_equal(lanes_plain.beside(np.arange(8)), [1, 0, 3, 2, 5, 4, 7, 6])
+    np.testing.assert_array_equal(lanes_plain.swap_pairs(np.arange(8)), [1, 0, 3, 2, 5, 4, 7, 6])
 
 
 def test_plain_functions_have_the_names_of_the_compiled_ones():
@@ -184,7 +184,7 @@ def test_plain_functions_have_the_names_of_the_compiled_ones():
 
 def test_aligned_arrays_start_on_a_cache_line():
     array = np.random.default_rng(0).normal(size=(5, 3))
-    copies = [aligned(array[k:]) for k in range(5)] + [aligned(array.T)]
+    copies = [aligned_copy(array[k:]) for k in range(5)] + [aligned_copy(array.T)]
     for copy, original in zip(copies, [*(array[k:] for k in range(5)), array.T], strict=True):
         np.testing.assert_array_equal(copy, original)
         assert copy.flags.c_contiguous

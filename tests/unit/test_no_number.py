@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from railsim.kernels import compiled
-from railsim.kernels.track_frame import TrackTables, cell_of
-from railsim.kernels.wheel_surface import cell_around
+from railsim.kernels.track_frame import TrackTables, track_cell
+from railsim.kernels.wheel_surface import angle_cell
 
 NOWHERE = (math.nan, math.inf, -math.inf, 1e300, -1e300, 1e19, -1e19)
 
 
 @compiled
 def cell_on_track(track, s):
-    return cell_of(track, s)
+    return track_cell(track, s)
 
 
 @compiled
 def cell_on_wheel(phi, n_phi):
-    return cell_around(phi, n_phi)
+    return angle_cell(phi, n_phi)
 
 
 @pytest.mark.parametrize("s", NOWHERE)

@@ -10,7 +10,7 @@ import railsim
 from railsim.kernels import vibration as kernel
 from railsim.kernels.actuators import ABOUT, ACTION, BY_DAMPER, BY_FORCE, COMMAND, LARGEST, MODE
 from railsim.kernels.contact_columns import W_Q, WHEEL_COLUMNS
-from railsim.kernels.support import MOST_CORRECTIONS
+from railsim.kernels.support import MAX_CORRECTIONS
 from railsim.kernels.vibration import (
     ALTERNATES_AT,
     ALTERNATION,
@@ -47,7 +47,7 @@ def test_nothing_counted_is_nothing_said():
 def test_all_corrections_used_are_told_with_their_number_and_a_way_to_check():
     remark = unsettled_rails(17)
     assert "17 evaluations" in remark
-    assert f"all {MOST_CORRECTIONS} iterations" in remark
+    assert f"all {MAX_CORRECTIONS} iterations" in remark
     assert "0.02%" in remark
     assert "--check-step" in remark
 
@@ -151,12 +151,12 @@ def test_on_rigid_rails_irregularities_are_not_the_only_possible_cause(slides, e
 @pytest.mark.parametrize("frequency", [30.0, 60.0, 150.0])
 def test_a_wave_of_the_wheel_load_is_found_as_it_is(frequency, monkeypatch):
     """Behind a Butterworth filter: f^2/sqrt(f^4 + 40^4) of it, tan(pi f h) for f."""
-    monkeypatch.setattr(kernel, "note_alternation", kernel.note_alternation.py_func)
+    monkeypatch.setattr(kernel, "update_alternation", kernel.update_alternation.py_func)
     h, amplitude = 1e-3, 5e3
     work = Record(wheel=np.zeros((1, 2, WHEEL_COLUMNS)), vibration=np.zeros((1, 2, VIBRATION)))
     for k in range(2000):
         work.wheel[0, 1, W_Q] = 5e4 + amplitude * np.sin(2.0 * np.pi * frequency * k * h)
-        kernel.watch.py_func(work, kernel.high_pass.py_func(h), h, 0.0)
+        kernel.update_vibration.py_func(work, kernel.high_pass_coefficients.py_func(h), h, 0.0)
     squared, at_cut = (np.tan(np.pi * f * h) ** 2 for f in (frequency, 40.0))
     passed = amplitude * squared / np.hypot(squared, at_cut)
     assert not work.vibration[0, 0, [AMPLITUDE, FREQUENCY]].any()
@@ -364,7 +364,7 @@ def test_a_commanded_damper_that_takes_three_tenths_of_a_velocity_in_a_step_is_t
     which[1, [ACTION, MODE, COMMAND]] = actions[about], BY_DAMPER, 3
     inertia = np.array([[500.0, 900.0, 1000.0], [250.0, 450.0, 500.0]])
     system = Record(
-        actuators=Record(which=which, body=np.array([(0, 0), body])),
+        actuators=Record(codes=which, body=np.array([(0, 0), body])),
         bodies=Record(mass=np.array([2000.0, 1000.0]), inertia=inertia),
     )
     for times, said in ((0.99, False), (1.01, True)):

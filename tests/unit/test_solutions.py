@@ -17,7 +17,7 @@ from railsim.simulation import step_choice
 @pytest.fixture
 def folder(monkeypatch, tmp_path):
     """Folder of the solutions of this test."""
-    place = cache.own_folder("solutions", base=tmp_path)
+    place = cache.cache_subfolder("solutions", base=tmp_path)
     monkeypatch.setattr(solutions, "solutions_folder", lambda _: place)
     monkeypatch.setattr(solutions, "_new", Counter())
     monkeypatch.setattr(step_choice, "_JUDGED", {})
@@ -119,7 +119,7 @@ def test_number_of_solutions_is_bounded(folder, monkeypatch):
         solutions.solution("test", str(number), lambda number=number: {"number": number})
         left.append(set())
         for path in folder.glob("*.json"):
-            left[-1].add(found := json.loads(cache.stored(path))["number"])
+            left[-1].add(found := json.loads(cache.load(path))["number"])
             os.utime(path, (found, found))  # as old as its number says
     assert left[9] == {*range(10)}
     assert left[10] == {*range(5, 11)}  # the older half makes room
@@ -134,7 +134,7 @@ def test_shared_solution_is_found_by_one_process_while_others_wait(folder, monke
         cache.store(path.with_suffix(".json"), b'{"holds": true}')
         yield
 
-    monkeypatch.setattr(solutions, "alone", waits)
+    monkeypatch.setattr(solutions, "exclusive", waits)
     found = solutions.solution("class", "inputs", lambda: pytest.fail("again"), shared=True)
     assert found == {"holds": True}
 

@@ -9,9 +9,9 @@ from scipy.optimize import approx_fprime
 
 from railsim.kernels import (
     contact_damping,
-    learning,
     rails,
     rotation,
+    slope_adaptation,
     support,
     support_step,
     track_frame,
@@ -47,8 +47,8 @@ from railsim.kernels.contact_columns import (
     SLOPE_ALONG,
     T_X,
     T_Y,
-    TURN_Y,
-    TURN_Z,
+    TANGENT_Y,
+    TANGENT_Z,
     W_C_Y,
     W_C_Z,
     W_NORMAL,
@@ -66,8 +66,15 @@ from railsim.kernels.contact_columns import (
 )
 from railsim.kernels.contact_table import G_ROLL, G_Y, K2_ROLL, K2_Y, K_ROLL, K_Y, LOOK_UP_SIZE
 from railsim.kernels.lanes import LANES
-from railsim.kernels.learning import LEARNT_SIZE
-from railsim.kernels.rails import CHANGE_ROLL, CHANGE_Y, CHANGE_Z, CHANGES, PLANE_SIZE, RAIL_SIZE
+from railsim.kernels.rails import (
+    CHANGE_ROLL,
+    CHANGE_Y,
+    CHANGE_Z,
+    PLANE_SIZE,
+    RAIL_SIZE,
+    RATE_CHANGE_SIZE,
+)
+from railsim.kernels.slope_adaptation import LMS_SIZE
 from railsim.kernels.state import ARC_LENGTH, LAST_STEP, SPEED, smoothed_begin
 from railsim.kernels.support import (
     ACCELERATION,
@@ -85,23 +92,23 @@ from railsim.kernels.support import (
     K_BALLAST_Z,
     K_PAD_Y,
     K_PAD_Z,
-    LEARNT,
+    LMS,
     M_RAIL,
     M_SLEEPER,
     MEAN_CHANGE,
     MEAN_RATE,
-    MOVED,
     PADS,
     PENDING,
     RATE,
     SKIP,
+    STEP_RATIO,
     SUPPORT_COLUMNS,
     SUPPORT_ROW,
     SUPPORT_SIZE,
     SUPPORT_STEP,
-    WEIGHT,
+    URGENT,
 )
-from railsim.kernels.system import AHEAD, N_EVENTS, N_WATCH
+from railsim.kernels.system import HORIZON, N_EVENTS, N_STEPPING
 from railsim.kernels.track_frame import TrackTables
 
 SIDES = np.array([-1.0, 1.0])
@@ -157,7 +164,7 @@ def test_forces_of_tracks_and_their_implicit_motion_are_those_of_matrices(plain)
             C[here, here] += damped
         load[w] = np.linalg.solve(m * M + c * C + k * K, load[w])
     np.testing.assert_allclose(found, in_lanes(load), rtol=1e-10)
-    weights = support.weighed(given.row, in_lanes(u))
+    weights = support.inertia(given.row, in_lanes(u))
     expected = np.array([M @ x for (M, _, _), x in zip(own, u, strict=True)])
     np.testing.assert_allclose(weights, in_lanes(expected))
     masses = [support.mass_of(given.row, k) for k in range(DOF)]
@@ -171,7 +178,7 @@ def test_stiffness_of_the_track_is_that_where_each_wheelset_stands(plain):
     system.bodies, system.contact = Record(frame=[0, 2, 1]), Record(body=[1, 2])
     work = Record(support_step=np.full((2, SUPPORT_STEP), 7.0))
     plain(support)
-    support.locate_support(system, work, 6.0)
+    support.update_factors(system, work, 6.0)
     for w, s in enumerate((7.0, 3.5)):
         found = work.support_step[w, [PADS, BALLAST, PENDING, SKIP]]
         expected = [np.interp(s, variation[:, 0], variation[:, k]) for k in (1, 2)]
@@ -201,7 +208,7 @@ def test_slopes_of_the_creep_force_are_its_derivatives(plain):
     )
     found = np.zeros((3, LANES))
     plain(contact_damping)
-    contact_damping.creep_slopes(LANES, patches, speed, G, *found)
+    contact_damping.estimate_creep_slopes(LANES, patches, speed, G, *found)
     for k in range(LANES):
         given = G, a[k], b[k], mu_N[k], c11[k], c22[k], c23[k], phi[k]
         slopes = approx_fprime(xi[:, k], lambda x, g=given: creep_force(x, *g), 1e-9)
@@ -213,7 +220,7 @@ def test_slopes_of_the_creep_force_are_its_derivatives(plain):
         work.patch[[T_X, T_Y], 0] = creep_force(xi[:, k], *given)
         work.contact_jacobian = np.zeros((1, CONTACT_JACOBIAN))
         system = Record(support=Record(elastic=0), contact=Record(body=[0]))
-        contact_damping.couple_directions(system, work, 1)
+        contact_damping.add_slip_coupling(system, work, 1)
         cross = speed * work.contact_jacobian[0, J_CROSS]
         mean = np.sqrt(slopes[0, 1] * slopes[1, 0])
         assert cross == pytest.approx(np.copysign(mean, slopes[0, 1]), rel=2e-3, abs=0.02 * secant)
@@ -234,8 +241,8 @@ def test_slopes_of_followed_creepages_are_those_of_what_the_step_takes_up(plain)
     state[LAST_STEP] = 1.5e-3
     index = np.array([[0, 0, 1], [0, 1, 0]])
     for _, side, p in index:
-        state[first + transient.PATCH_STATE * (transient.TRACED * side + p) + transient.CARRIES] = (
-            transient.CARRIED
+        state[first + transient.PATCH_STATE * (transient.TRACED * side + p) + transient.LOADED] = (
+            transient.CARRYING
         )
     given = random.uniform(0.5, 2.0, (PATCH_ROWS, 2))
     given[A], given[PATCH_SPEED] = [4e-3, 9e-3], [20.0, 8.0]
@@ -245,12 +252,12 @@ def test_slopes_of_followed_creepages_are_those_of_what_the_step_takes_up(plain)
     def followed(change):
         work.patch = given.copy()
         work.patch[XI_X] += change
-        transient.follow_creepages(system, work, 2, state)
+        transient.delay_creepages(system, work, 2, state)
         return work.patch[XI_X].copy()
 
     before = followed(0.0)
     slope = followed(1.0) - before
-    transient.give_back_creepages(system, work, 2, state)
+    transient.restore_creepages(system, work, 2, state)
     rows = [SLOPE_ALONG, SLOPE_ACROSS, SECANT_ALONG]
     np.testing.assert_allclose(work.patch[rows], given[rows] * slope, rtol=1e-10)
     z = 1.5e-3 * given[PATCH_SPEED] / given[A]
@@ -272,7 +279,9 @@ def test_patches_that_load_each_other_share_a_motion_as_their_equations_say(touc
     index = np.zeros((n + 2, 3), dtype=np.int64)
     index[:, 2] = [2, *touching, 0]  # of other wheels before and after
     work = Record(patch=patch, patch_index=index)
-    contact_damping.couple_stiffness.py_func(work, np.array([[9.0, 9.0], [0.3, 0.2]]), 1, 1, n + 1)
+    contact_damping.couple_patch_stiffness.py_func(
+        work, np.array([[9.0, 9.0], [0.3, 0.2]]), 1, 1, n + 1
+    )
     matrix = np.eye(n) + k[of, None] * kappa[np.ix_(of, of)]
     np.testing.assert_allclose(patch[rows, 1:-1].T, np.linalg.solve(matrix, (k * normal)[:, of].T))
     assert not patch[:, [0, -1]].any()
@@ -303,7 +312,7 @@ def test_stiffness_of_a_patch_is_how_its_force_changes_with_the_motion_of_the_wh
 
     for sign in (-1.0, 1.0):
         V = vertical(np.zeros(3), sign)
-        contact_damping.note_stiffness(system, work, 0, 2, k, sign, 1e-4, V)
+        contact_damping.store_patch_stiffness(system, work, 0, 2, k, sign, 1e-4, V)
         slopes = approx_fprime(np.zeros(3), lambda x, sign=sign: vertical(x, sign), 1e-11)
         assert patch[[FORCE_PER_Y, FORCE_PER_Z, FORCE_PER_ROLL], 2] == pytest.approx(slopes, 1e-4)
         assert patch[NORMAL_STIFFNESS, 2] == pytest.approx(slopes[1] / np.cos(g) ** 2, 1e-4)
@@ -318,7 +327,7 @@ def test_a_patch_takes_its_slip_and_its_approach_from_the_wheelsets_speeds(plain
     n, t = np.array([0.0, np.sin(g), np.cos(g)]), np.array([0.0, np.cos(g), -np.sin(g)])
     share = patch[T_Y, 2] / patch[NORMAL, 2]
     plain(contact_damping)
-    contact_damping.add_damping(
+    contact_damping.add_wheelset_damping(
         Record(patch=patch, contact_jacobian=jacobian), 1, 2, across, damping
     )
     slip, normal = np.zeros((2, 3, 3))
@@ -340,19 +349,19 @@ def test_a_track_that_is_corrected_is_as_if_its_step_had_had_the_corrected_mean_
         contact=Record(transient=0, body=np.zeros(2)),
         support=Record(row=random.uniform(0.5, 2.0, SUPPORT_ROW), sleeper=1),
     )  # fmt: skip
-    for module in (support, learning, support_step):
+    for module in (support, slope_adaptation, support_step):
         plain(module)
     begin = support.support_begin(system)
     state = random.normal(size=begin + 2 * SUPPORT_SIZE)
     tracks = state[begin:].reshape(2, SUPPORT_SIZE)
-    tracks[:, WEIGHT], tracks[:, LEARNT : LEARNT + 2 * LEARNT_SIZE] = g, 0.0
+    tracks[:, STEP_RATIO], tracks[:, LMS : LMS + 2 * LMS_SIZE] = g, 0.0
     before = tracks.copy()
     work = Record(
         support=random.uniform(0.1, 0.4, (2, 2, SUPPORT_COLUMNS)),
         support_step=random.uniform(0.5, 2.0, (2, SUPPORT_STEP)),
     )
-    work.support_step[:, MOVED] = 1.0, 0.0
-    support_step.move_rails(system, work, state, support_step.eight_in_pairs(0, 2), h, True)
+    work.support_step[:, URGENT] = 1.0, 0.0
+    support_step.correct_rails(system, work, state, support_step.paired_numbers(0, 2), h, True)
     change = tracks - before
     r = change[0, MEAN_RATE : MEAN_RATE + DOF].copy()
     assert np.all(r != 0.0)
@@ -378,9 +387,9 @@ def test_a_correction_that_has_waited_is_that_of_the_step_before(plain):
         support=random.uniform(0.1, 0.4, (2, 2, SUPPORT_COLUMNS)),
         support_step=random.uniform(0.5, 2.0, (2, SUPPORT_STEP)),
     )
-    state[begin:].reshape(2, SUPPORT_SIZE)[:, WEIGHT] = before
-    learnt = [begin + SUPPORT_SIZE * w + LEARNT + LEARNT_SIZE * k for w in (0, 1) for k in (0, 1)]
-    wheels, change = support_step.eight_in_pairs(0, 2), random.normal(size=(7, LANES))
+    state[begin:].reshape(2, SUPPORT_SIZE)[:, STEP_RATIO] = before
+    learnt = [begin + SUPPORT_SIZE * w + LMS + LMS_SIZE * k for w in (0, 1) for k in (0, 1)]
+    wheels, change = support_step.paired_numbers(0, 2), random.normal(size=(7, LANES))
     change[:, 4:] = np.tile(change[:, 2:4], 2)
 
     def stepped(given, waits):
@@ -421,9 +430,9 @@ def test_rails_without_mass_yield_to_a_force_as_their_matrices_say(sleeper, plai
     plain(support)
     begin = support.support_begin(system)
     work, state = Record(compliance=np.zeros(3)), np.zeros(begin + SUPPORT_SIZE)
-    state[begin + WEIGHT], state[LAST_STEP] = c - 1.0, h
+    state[begin + STEP_RATIO], state[LAST_STEP] = c - 1.0, h
     row[M_RAIL] *= 1 - sleeper
-    support.step_compliance(system, work, state)
+    support.set_compliance(system, work, state)
     M, C, K = (part[: 7 if sleeper else 4, : 7 if sleeper else 4] for part in matrices(row, 1, 1))
     force = np.zeros((len(M), 2))
     force[[0, 2], 0] = force[[1, 3], 1] = 1.0
@@ -439,9 +448,9 @@ def test_rates_beside_the_rails_change_by_the_rails_slopes_and_the_acceleration(
     for module in (rotation, track_frame, rails):
         plain(module)
     table = TrackTables(0.0, 1.0, c, c, 1, 1.5)
-    rails.locate_in_cells(table, np.zeros(1, dtype=np.int64), np.array([now]), plane, rail)
-    watch, state = np.zeros(N_WATCH), random.normal(size=80)
-    watch[AHEAD], state[SPEED], state[ARC_LENGTH] = h, speed, now - 0.1
+    rails.interpolate_rails(table, np.zeros(1, dtype=np.int64), np.array([now]), plane, rail)
+    watch, state = np.zeros(N_STEPPING), random.normal(size=80)
+    watch[HORIZON], state[SPEED], state[ARC_LENGTH] = h, speed, now - 0.1
     system = Record(
         track=table,
         bodies=Record(kind=np.zeros(2), frame=[0, 1]),
@@ -449,8 +458,8 @@ def test_rates_beside_the_rails_change_by_the_rails_slopes_and_the_acceleration(
         contact=Record(body=[1]),
         internal=Record(kind=np.zeros(0)),
     )
-    change = np.zeros((2, CHANGES))
-    work = Record(plane=plane, rail=rail, rate_change=change, watch=watch)
+    change = np.zeros((2, RATE_CHANGE_SIZE))
+    work = Record(plane=plane, rail=rail, rate_change=change, stepping=watch)
     own = smoothed_begin(2, 0) + 6
     rails.predict_rate_changes(system, work, 0, state)
     y_a, z_a, roll_a = state[own + 1 : own + 4]
@@ -476,7 +485,7 @@ def test_forces_of_patches_on_their_wheels_and_what_is_told_of_them(plain):
     work = Record(
         patch=patch, patch_index=np.array([[0, 1, 0], [0, 1, 2], [0, 0, 0]]),
         rail_force=np.zeros((2, 6)), wheel=np.zeros((1, 2, WHEEL_COLUMNS)),
-        watch=np.zeros(N_WATCH), events=np.zeros((1, N_EVENTS), dtype=np.int64),
+        stepping=np.zeros(N_STEPPING), events=np.zeros((1, N_EVENTS), dtype=np.int64),
         contact_jacobian=np.zeros((2, CONTACT_JACOBIAN)),
     )  # fmt: skip
     for module in (contact_damping, wheel_rail):
@@ -485,7 +494,7 @@ def test_forces_of_patches_on_their_wheels_and_what_is_told_of_them(plain):
     force, told = np.zeros(6), np.zeros((2, 4))
     for k, side in enumerate((1, 1, 0)):
         s, c = patch[[NORMAL_Y, NORMAL_Z], k]
-        along = np.array([1.0, *patch[[TURN_Y, TURN_Z], k]])
+        along = np.array([1.0, *patch[[TANGENT_Y, TANGENT_Z], k]])
         normal, across = np.array([0.0, s, c]), np.array([0.0, c, -s])
         normal[0], across[0] = -along @ normal, -along @ across
         acts = -patch[T_X, k] * along - patch[T_Y, k] * across

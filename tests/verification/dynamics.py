@@ -9,9 +9,9 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.contact_table import (
     LOOK_UP_SIZE,
     N_WEIGHT,
-    cell_weights,
-    locate,
+    find_cell,
     look_up,
+    set_cell_weights,
     stretched_roll,
 )
 from railsim.kernels.rhs import locate_frames, right_hand_side
@@ -224,10 +224,10 @@ def _contact_energy(system, work, state):
             y, z = y - rails[w, 2 * side], z - rails[w, 2 * side + 1]
             table = contact.table[w, side]
             stretched, slope = stretched_roll(sign * roll)
-            _, iy, ir, iw, ty, tr, tw = locate(
+            _, iy, ir, iw, ty, tr, tw = find_cell(
                 contact, table, sign * y, sign * roll, stretched, yaw**2
             )
-            cell_weights(contact, ty, tr, slope, weights)
+            set_cell_weights(contact, ty, tr, slope, weights)
             p, K, K2 = np.zeros(3), np.zeros(3), np.zeros(3)
             for patch in range(3):
                 look_up(contact, table, patch, iy, ir, iw, tw, weights, out)

@@ -8,7 +8,7 @@ patches, strikes and friction make more and more of the round-off.
 import numpy as np
 
 from railsim.kernels.state import N_SCALARS
-from railsim.kernels.support import DOF, LEARNT, LEARNT_SIZE, SUPPORT_SIZE, WEIGHT
+from railsim.kernels.support import DOF, LMS, LMS_SIZE, STEP_RATIO, SUPPORT_SIZE
 from railsim.kernels.system import Y_0
 
 ACROSS = np.array([1.0, -1.0, 1.0])  # along, across, down
@@ -67,10 +67,10 @@ def image(system, mirrored):
     signs = [body_signs, body_signs, inner_signs, body_signs, inner_signs]
     first = 18 * n + 2 * m
     if system.support.elastic:
-        sides = LEARNT + (np.arange(2 * LEARNT_SIZE) + LEARNT_SIZE) % (2 * LEARNT_SIZE)
+        sides = LMS + (np.arange(2 * LMS_SIZE) + LMS_SIZE) % (2 * LMS_SIZE)
         blocks = (DOF * np.arange(5)[:, None] + TRACK).ravel()
         for _ in system.contact.body:
-            parts.append(first + np.concatenate((blocks, sides, [WEIGHT])))
+            parts.append(first + np.concatenate((blocks, sides, [STEP_RATIO])))
             signs.append(np.concatenate((np.tile(TRACK_SIGNS, 5), np.tile(LEARNT_SIGNS, 2), [1])))
             first += SUPPORT_SIZE
     parts.append(first + np.arange(N_SCALARS))

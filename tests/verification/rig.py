@@ -12,9 +12,9 @@ from dynamics import Settings, absolute_frame, load_track, load_vehicle, rotatio
 
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.compiler import entry
-from railsim.kernels.internal import AIR, PAD, advanced, constant_decays, curve_value
+from railsim.kernels.internal import AIR, PAD, curve_value, set_decays, state_after
 from railsim.kernels.rhs import right_hand_sides
-from railsim.kernels.step_rk4 import settle_limits
+from railsim.kernels.step_rk4 import restore_limits
 from railsim.kernels.system import AXLEBOX, FORCE, WHEELSET
 from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import assemble
@@ -102,7 +102,7 @@ class Rig:
         internal, curves = self.system.internal, self.system.curves
         h = time[1] - time[0]
         decay = np.zeros(len(internal.kind))
-        constant_decays(internal, h, decay)
+        set_decays(internal, h, decay)
         forces = np.zeros((len(time), 6))
         for k in range(len(time)):
             # a step's drive: a rate counts in its middle, an air spring's deflection too
@@ -110,7 +110,7 @@ class Rig:
             self.forces(position(time[k] + 0.5 * h), rate(time[k] + 0.5 * h))
             for i in range(len(internal.kind)):
                 at = 12 * self.n + i
-                self.state[at] = advanced(
+                self.state[at] = state_after(
                     internal,
                     curves,
                     i,
@@ -120,7 +120,7 @@ class Rig:
                     h,
                     decay[i],
                 )
-            settle_limits(internal, curves, 12 * self.n, self.work.drive, self.state)
+            restore_limits(internal, curves, 12 * self.n, self.work.drive, self.state)
         return forces
 
 

@@ -29,7 +29,7 @@ ROTATING = LOADED + 2.0 * WHEELSET["inertia"][1] / RADIUS**2
 def limited(value, deflection, rate, **limits):
     """Force of an actuator along x that is given a command."""
     rig = Rig(kind="actuator", acts="x", **limits)
-    rig.work.memory[rig.system.actuators.which[0, COMMAND]] = value
+    rig.work.memory[rig.system.actuators.codes[0, COMMAND]] = value
     return rig.force(0, deflection, rate)
 
 
@@ -79,7 +79,7 @@ def test_an_actuator_along_a_line_pulls_along_it_where_it_is_now():
     """Its points are 3, 4 and 12 parts of 13 apart, and 0, 5 and 12 once one has moved."""
     points = [[0.0, 0.0, -1.0], [0.3, 0.4, -2.2]]
     rig = Rig(kind="actuator", point=None, points=points, power_limit=1e3)
-    rig.work.memory[rig.system.actuators.which[0, COMMAND]] = 1300.0
+    rig.work.memory[rig.system.actuators.codes[0, COMMAND]] = 1300.0
     for moved, line in (([0.0, 0.0], [3.0, 4.0, -12.0]), ([-0.3, 0.1], [0.0, 5.0, -12.0])):
         found = rig.forces([*moved, 0.0, 0.0, 0.0, 0.0], np.zeros(6))
         assert found[:3] == pytest.approx(100.0 * np.array(line), abs=1e-6)
@@ -100,7 +100,7 @@ def test_an_actuator_along_or_about_an_axis_of_its_body_turns_with_it(acts):
     axis = (rotation(yaw, 2) @ rotation(roll, 0) @ rotation(pitch, 1))[:, k]
     own = slice(3 * about, 3 * about + 3)
     rig = Rig(kind="actuator", acts=acts, power_limit=1e3)
-    rig.work.memory[rig.system.actuators.which[0, COMMAND]] = 1300.0
+    rig.work.memory[rig.system.actuators.codes[0, COMMAND]] = 1300.0
     rig.state[6 * rig.frame + 3 : 6 * rig.frame + 6] = roll, pitch, yaw
     for sense, speed, force in ((1, 0.0, 1300.0), (1, 2.0, 500.0), (-1, -2.0, -500.0)):
         rig.system.actuators.row[0, SENSE] = sense

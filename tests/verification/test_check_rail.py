@@ -149,10 +149,10 @@ def test_force_is_stiffness_and_damping_of_the_penetration(right):
     state[7], work.acceleration[0, 3], work.acceleration[0, 5] = 0.03, 0.2, right * 0.5
     work.plane[0, [rails.MIDDLE_Y, rails.SLOPE_Y]] = now[0], 0.004
     work.plane[0, [rails.ROLL, rails.ROLL_SLOPE]] = now[2], -0.006
-    of_rail = [rails.ASIDE, rails.ASIDE_SLOPE, rails.RAIL_SLOPE, rails.RAIL_BEND]
+    of_rail = [rails.SHIFT, rails.SHIFT_SLOPE, rails.RAIL_SLOPE, rails.RAIL_BEND]
     work.rail[0, side, of_rail] = now[1], 0.003, now[3], 0.005
     system = Record(contact=contact, bodies=Record(kind=np.zeros(1)))
-    kernel.check_rail.py_func(system, work, speed, state, 0, 0, flangeway, -0.01)
+    kernel.add_check_rail.py_func(system, work, speed, state, 0, 0, flangeway, -0.01)
     rate = (penetration(1e-5) - penetration(-1e-5)) / 2e-5
     expected = 5e7 * penetration(0.0) + 5e4 * rate
     assert work.wheel[0, side, W_CHECK] == pytest.approx(expected, rel=1e-9)

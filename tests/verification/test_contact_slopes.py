@@ -9,11 +9,11 @@ from railsim.kernels.contact_columns import FOOT_X, FOOT_X_PER_YAW, J_NORMAL, J_
 from railsim.kernels.contact_table import FLANGE, FLANGE_ROOT, TREAD
 from railsim.kernels.support import (
     D_Y_SLIP,
-    LEARNT,
+    LMS,
     PATCHES,
     RATE,
+    STEP_RATIO,
     SUPPORT_SIZE,
-    WEIGHT,
     D,
     K,
     support_begin,
@@ -32,7 +32,7 @@ def curving():
     system = steady(coach, track, Settings(), SPEED).model.system
     state, first = np.array(end), support_begin(system)
     for w in range(4):  # what slopes have learnt comes on top
-        state[first + SUPPORT_SIZE * w :][LEARNT:WEIGHT] = 0.0
+        state[first + SUPPORT_SIZE * w :][LMS:STEP_RATIO] = 0.0
     return system, state, first
 
 

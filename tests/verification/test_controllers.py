@@ -186,15 +186,15 @@ def test_signals_of_two_actuators_are_each_its_own(plain):
     """Torques about two axles, given by two commands, and speeds that they turn with."""
     system = assemble(on_axle(), load_track("straight"), Settings()).system
     work, state = work_arrays(system), np.zeros(200)
-    work.memory[system.actuators.which[:, actuators.COMMAND]] = torques = [3e3, -1e3]
+    work.memory[system.actuators.codes[:, actuators.COMMAND]] = torques = [3e3, -1e3]
     work.pose[:, [0, 4, 8]] = 1.0
     axles = velocity_begin(system.bodies.kind.size) + 6 * system.actuators.body[:, 1] + 4
     state[axles] = speeds = [0.5, -2.0]
-    which = np.zeros((4, controllers.SIGNAL_WHICH), dtype=np.int64)
-    which[:, controllers.GROUP], which[:, controllers.OF] = controllers.ACTUATOR, [0, 1, 0, 1]
+    which = np.zeros((4, controllers.SIGNAL_CODES), dtype=np.int64)
+    which[:, controllers.GROUP], which[:, controllers.OBJECT] = controllers.ACTUATOR, [0, 1, 0, 1]
     torque, rate = element_outputs.MOMENT + 1, element_outputs.RATE + 4
     which[:, controllers.COMPONENT] = torque, torque, rate, rate
-    system = system._replace(signals=system.signals._replace(which=which))
+    system = system._replace(signals=system.signals._replace(codes=which))
     for module in (actuators, controllers):
         plain(module)
     found = [controllers.element_signal(system, work, state, i) for i in range(4)]
@@ -205,7 +205,7 @@ def test_noise_is_drawn_from_generators_of_full_period():
     """Each of the three goes through all numbers below its prime (Wichmann, Hill 1982)."""
     memory, found = np.ones(3), []
     for _ in range(30322):
-        controllers.uniform.py_func(memory, 0)
+        controllers.next_uniform.py_func(memory, 0)
         found.append(memory.copy())
     for k, prime in enumerate((30269, 30307, 30323)):
         assert np.flatnonzero(np.array(found)[:, k] == 1.0)[0] == prime - 2

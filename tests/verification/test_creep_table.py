@@ -98,13 +98,13 @@ def test_both_sums_of_rows_agree():
     weights = rng.normal(size=20)
     strides = (1100, 320, 92)
     sums = np.zeros((2, 16))
-    kernel._sum_of_rows_plain(table, 37, strides, weights, 5, sums[0])
+    kernel._sum_rows_plain(table, 37, strides, weights, 5, sums[0])
 
     from railsim.kernels import compiled
 
     @compiled
     def compiled(table, start, strides, weights, first, sums):
-        kernel._sum_of_rows(table, start, strides, weights, first, sums)
+        kernel._sum_rows(table, start, strides, weights, first, sums)
 
     compiled(table, 37, strides, weights, 5, sums[1])
     np.testing.assert_allclose(sums[1], sums[0], rtol=1e-12, atol=1e-12)

@@ -13,8 +13,8 @@ from selection import points
 import railsim
 from railsim.contact import contact_geometry
 from railsim.errors import ModelError
-from railsim.kernels.support import LEARNT
-from railsim.kernels.system import PARTS
+from railsim.kernels.support import LMS
+from railsim.kernels.system import MAX_PARTS
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.modes import modes
 from railsim.linear.stability_loss import LossOfStability, loss_of_stability
@@ -1009,8 +1009,8 @@ def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest
     assert np.array_equal(after[first + 1 : first + 6], changed[first + 1 : first + 6])
     before, found, known = (tracks_under(of.system, state) for state in (changed, after, rest))
     assert len(found) == 4
-    assert np.array_equal(found[:, :LEARNT], before[:, :LEARNT])
-    assert np.array_equal(found[:, LEARNT:], known[:, LEARNT:])
+    assert np.array_equal(found[:, :LMS], before[:, :LMS])
+    assert np.array_equal(found[:, LMS:], known[:, LMS:])
 
 
 def test_motions_in_threads_are_those_one_after_the_other(monkeypatch):
@@ -1121,16 +1121,16 @@ def test_what_leaves_the_rails_in_long_steps_is_looked_at_in_divided_ones(monkey
     motion, begun = object.__new__(motion_of.VehicleMotion), []
 
     def stretch(state, begin, end, duration):
-        begun.append((state, int(motion._work.parts[PARTS])))
+        begun.append((state, int(motion._work.counts[MAX_PARTS])))
         if not (stays and begun[-1][1]):
             raise LeftRange("rolled over")
         return "on the rails"
 
     def divide(system, work, scheme, step, speed):
-        work.parts[PARTS] = 10
+        work.counts[MAX_PARTS] = 10
 
     monkeypatch.setattr(motion_of, "divide_strikes", divide)
-    motion._work, motion.system = SimpleNamespace(parts=np.zeros(6, dtype=np.int64)), None
+    motion._work, motion.system = SimpleNamespace(counts=np.zeros(6, dtype=np.int64)), None
     motion.scheme, motion.step_at, motion._stretch = "fast", lambda speed: 1e-3, stretch
     if stays:
         assert motion.stretch(1.0, 40.0, 37.0, 10.0) == "on the rails"
@@ -1138,7 +1138,7 @@ def test_what_leaves_the_rails_in_long_steps_is_looked_at_in_divided_ones(monkey
         with pytest.raises(LeftRange, match="rolled over"):
             motion.stretch(1.0, 40.0, 37.0, 10.0)
     assert begun == [(1.0, 0), (1.0, 10)]
-    assert not motion._work.parts[PARTS]
+    assert not motion._work.counts[MAX_PARTS]
 
 
 def test_rest_is_not_called_stable_where_hunting_is_named_after_the_body():

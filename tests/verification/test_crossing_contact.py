@@ -18,7 +18,7 @@ from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.kernels import contact_columns as column
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.support import HEIGHTS
-from railsim.kernels.system import AHEAD, RADIUS
+from railsim.kernels.system import HORIZON, RADIUS
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
@@ -83,7 +83,7 @@ class OneWheel:
             if tuple(work.patch_index[k, :2]) != (0, 1):
                 continue  # the other wheel, far from any load
             sine, cosine = patch[column.NORMAL_Y], patch[column.NORMAL_Z]
-            across = patch[column.TURN_Y] * cosine - patch[column.TURN_Z] * sine
+            across = patch[column.TANGENT_Y] * cosine - patch[column.TANGENT_Z] * sine
             x += patch[column.T_X] - patch[column.T_Y] * across
             x += patch[column.NORMAL] * cosine * patch[column.RISE]
             patches[int(work.patch_index[k, 2])] = patch.copy()
@@ -291,13 +291,13 @@ def test_crossing_in_the_mirror():
 def test_a_wheelset_in_the_middle_is_foreseen_the_same_from_both_sides(wheel):
     """Where it stands on a node of the tables, round-off does not decide what its force becomes."""
     work = wheel.work
-    work.watch[AHEAD] = 1e-2
+    work.stepping[HORIZON] = 1e-2
     rates = np.empty((2, 22))
     for k, place in enumerate(np.linspace(-380.0, 460.0, 22)):
         for side, aside in enumerate((-1e-9, 1e-9)):  # mm
             wheel.at(place, aside - 1e3 * ASIDE, -0.3)
             rates[side, k] = work.force_rate[0]
-    work.watch[AHEAD] = 0.0
+    work.stepping[HORIZON] = 0.0
     np.testing.assert_allclose(rates[1], rates[0], rtol=1e-6)
 
 
@@ -305,11 +305,11 @@ def test_forces_over_the_crossing_do_not_depend_on_how_far_is_foreseen(wheel):
     """Of a wheel that is pressed onto changing rails; what is foreseen divides steps alone."""
     work, found = wheel.work, []
     for ahead in (0.0, 1e-2):
-        work.watch[AHEAD] = ahead
+        work.stepping[HORIZON] = ahead
         for place in np.linspace(-300.0, 460.0, 20):
             wheel.at(place, -1e3 * ASIDE, -0.3, down=0.2)
             found.append(work.rail_force[wheel.system.contact.body[0], :6].copy())
-    work.watch[AHEAD] = 0.0
+    work.stepping[HORIZON] = 0.0
     without, foreseen = np.reshape(found, (2, 20, 6))
     assert abs(without[:, 2]).max() > 1e4
     np.testing.assert_allclose(foreseen, without, rtol=1e-9, atol=1e-9)
@@ -322,9 +322,9 @@ def test_a_flange_that_comes_near_within_a_step_is_foreseen(wheel):
     for y in (0.0, 1e3 * speed * ahead):  # mm
         wheel.at(place, y - 1e3 * ASIDE, z)
         loads.append(-work.rail_force[wheel.system.contact.body[0], 2])
-    work.watch[AHEAD] = ahead
+    work.stepping[HORIZON] = ahead
     wheel.at(place, -1e3 * ASIDE, z, aside=speed)
-    work.watch[AHEAD] = 0.0
+    work.stepping[HORIZON] = 0.0
     assert loads[0] > 1e3
     assert loads[1] > 2.0 * loads[0]
     assert work.force_rate[0] * ahead > 0.5 * (loads[1] - loads[0])

@@ -292,12 +292,12 @@ def test_wheel_beside_all_rails_is_lifted_where_it_is_above_them_all(
     nearest, below, status, monkeypatch
 ):
     """`nearest`: from the highest rail down to the wheel; `below` the plain rail [m]."""
-    monkeypatch.setattr(table_ends, "plain_gap", lambda *_: 0.3)
+    monkeypatch.setattr(table_ends, "plain_height", lambda *_: 0.3)
     wheel, rails = (
         SimpleNamespace(z=0.3 + below - 0.7 * 0.01, roll=0.01),
         SimpleNamespace(lever=[0.7]),
     )
-    assert table_ends.without_rail.py_func(rails, 0, wheel, nearest) == status
+    assert table_ends.fall_status.py_func(rails, 0, wheel, nearest) == status
 
 
 @FURTHER

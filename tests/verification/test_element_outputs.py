@@ -108,7 +108,7 @@ def test_power_of_mounts_is_what_their_forces_take_from_the_bodies(seed, plain):
     inner = 1e3 * random.normal(size=system.internal.kind.size)
     for module in (internal, element_columns, elements, element_outputs):
         plain(module)
-    elements.mount_forces(system, work, inner)
+    elements.add_mount_forces(system, work, inner)
     given = np.zeros(n)
     for motion, force in ((VELOCITY, FORCE), (ANGULAR, MOMENT)):
         given += np.einsum(
@@ -116,7 +116,7 @@ def test_power_of_mounts_is_what_their_forces_take_from_the_bodies(seed, plain):
         )
     out = np.zeros((system.mounts.body.shape[0], element_outputs.RATE + 6))
     for e in range(len(out)):
-        element_outputs.mount_output(system, work, inner, e, e, out)
+        element_outputs.write_mount_output(system, work, inner, e, e, out)
     power = out[:, element_outputs.POWER]
     assert mounts.flags[:, BOTH_ENDS].any()
     assert power.sum() == pytest.approx(-given.sum(), abs=1e-9 * abs(power).sum())

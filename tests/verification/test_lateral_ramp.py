@@ -19,7 +19,6 @@ from railsim.definitions.settings import Settings
 from railsim.kernels.contact_table import (
     B1,
     D_B1,
-    FURTHEST_W,
     G_ROLL,
     G_Y,
     K2,
@@ -28,11 +27,12 @@ from railsim.kernels.contact_table import (
     K_ROLL,
     K_Y,
     LOOK_UP_SIZE,
+    MAX_W,
     N_PATCH,
     N_WEIGHT,
     K,
-    cell_weights,
     look_up,
+    set_cell_weights,
 )
 from railsim.model import assembly
 
@@ -96,7 +96,7 @@ def looked_up(contact, patch, j, share, t=0.5, table=0):
     """Fields of a patch in cell `j` of y at no roll, at a share of the table's last yaw squared."""
     _, _, n_w, n_roll, _, _ = contact.values.shape
     weights, out = np.empty(N_WEIGHT), np.empty(LOOK_UP_SIZE)
-    cell_weights(contact, t, 0.0, 1.0, weights)
+    set_cell_weights(contact, t, 0.0, 1.0, weights)
     tw = 1.0 + (share - 1.0) * contact.w[-1] / (contact.w[-1] - contact.w[-2])
     look_up(contact, table, patch, j + 1, n_roll // 2, n_w - 2, tw, weights, out)
     return out
@@ -119,7 +119,7 @@ def test_patches_keep_stiffness_and_width_as_far_as_the_table_is_continued(conta
 
     `root`: of the penetration [m^0.5].
     """
-    shares, patches = [1.0, 1.2, 1.56, FURTHEST_W], every_patch(contact)
+    shares, patches = [1.0, 1.2, 1.56, MAX_W], every_patch(contact)
     found = np.array([[looked_up(contact, *one, share) for one in patches] for share in shares])
     exists = (found[0, :, K] > 0.0) & (found[0, :, K] + 0.01 * found[0, :, K2] > 0.0)
     exists &= np.minimum(found[0, :, B1], found[0, :, B1] + found[0, :, D_B1]) > 0.0

@@ -17,7 +17,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.out_of_round import Flat, Harmonics, RadiusTable, Sections
 from railsim.errors import InputError
-from railsim.kernels.wheel_surface import angle_to_flat, surface_at
+from railsim.kernels.wheel_surface import angle_to_flat, surface_height
 from railsim.profiles import Profile
 from railsim.simulation import simulate
 
@@ -63,7 +63,7 @@ class Tables:
         self.surface_row, self.surface, self.flat_ahead = surface_arrays([wheel_surface(*args)])
 
     def at(self, phi, y=0.0):
-        return surface_at.py_func(self, 0, phi, y)
+        return surface_height.py_func(self, 0, phi, y)
 
 
 def round_rail(radius):

@@ -26,8 +26,8 @@ row = np.array([[*arm, *[0.0] * 5]])
 
 def read(quantity, component):
     which = np.zeros((1, 16), dtype=int)
-    which[0, [kernel.KIND, kernel.OF, kernel.COMPONENT]] = quantity, 1, component
-    system = Record(signals=Record(which=which, row=row), bodies=Record(kind=np.zeros(2, int)))
+    which[0, [kernel.KIND, kernel.OBJECT, kernel.COMPONENT]] = quantity, 1, component
+    system = Record(signals=Record(codes=which, row=row), bodies=Record(kind=np.zeros(2, int)))
     return kernel.point_signal(system, work, state, derivative, 0)
 
 moved = turned @ arm - arm
@@ -62,7 +62,7 @@ row[0, :7] = *points.ravel(), 1.0
 mounts = Record(row=row, body=np.array([[0, 1]]), flags=np.eye(4, dtype=int)[:1],
                 law=np.zeros((0, 3), dtype=int))
 work = Record(pose=pose, laws=np.zeros(LAWS_SIZE))
-outputs.mount_output(Record(mounts=mounts, internal=None), work, np.zeros(0), 0, 0, out)
+outputs.write_mount_output(Record(mounts=mounts, internal=None), work, np.zeros(0), 0, 0, out)
 np.testing.assert_allclose(out[0, :3], deflection(0.0), atol=1e-14)
 rate = (deflection(1e-5) - deflection(-1e-5)) / 2e-5
 np.testing.assert_allclose(out[0, outputs.RATE : outputs.RATE + 3], rate, atol=1e-8)

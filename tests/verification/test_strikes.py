@@ -16,7 +16,7 @@ from railsim.definitions.loading import load_track as load_any_track
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.state import N_SCALARS
-from railsim.kernels.support import LEARNT, SUPPORT_SIZE, WEIGHT
+from railsim.kernels.support import LMS, STEP_RATIO, SUPPORT_SIZE
 from railsim.simulation import simulate
 from railsim.simulation.remarks import MOST_Q
 
@@ -133,7 +133,7 @@ def test_run_on_irregular_elastic_rails_goes_on_to_the_same_bytes():
     whole = simulate(coach, track, speed=SPEED, until=60.0)
     first = simulate(coach, track, speed=SPEED, until=33.0)
     state = first.groups["state"]["end"][:-N_SCALARS]
-    assert np.count_nonzero(state[-SUPPORT_SIZE:][LEARNT:WEIGHT]) > 7
+    assert np.count_nonzero(state[-SUPPORT_SIZE:][LMS:STEP_RATIO]) > 7
     second = simulate(coach, track, until=60.0, resume=first)
     np.testing.assert_array_equal(second.groups["state"]["end"], whole.groups["state"]["end"])
     for name in ("steps", "steps_divided", "evaluations", "contacts_evaluated_again"):

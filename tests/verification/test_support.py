@@ -22,7 +22,7 @@ from railsim.kernels.support import (
     RATE,
     SUPPORT_SIZE,
     SUPPORT_STEP,
-    factors,
+    set_factors,
     support_begin,
 )
 from railsim.kernels.time_loop import Chunk, time_loop
@@ -490,6 +490,6 @@ def test_factors_between_two_places_are_interpolated():
     variation = np.array([[10.0, 1.0, 1.0], [20.0, 3.0, 0.5], [40.0, 2.0, 2.0]])
     out = np.zeros(SUPPORT_STEP)
     for s in (0.0, 10.0, 12.5, 20.0, 35.0, 50.0):
-        factors(variation, s, out)
+        set_factors(variation, s, out)
         assert out[PADS] == pytest.approx(np.interp(s, variation[:, 0], variation[:, 1]))
         assert out[BALLAST] == pytest.approx(np.interp(s, variation[:, 0], variation[:, 2]))

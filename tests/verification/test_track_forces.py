@@ -12,7 +12,7 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.track.definition import Track
 from railsim.kernels.contact_columns import W_NORMAL
-from railsim.kernels.support import SETTLED
+from railsim.kernels.support import FORCE_TOLERANCE
 from railsim.simulation import simulate
 from railsim.simulation.run_in import follow_rails
 
@@ -375,7 +375,7 @@ def test_irregular_rails_mirrored_give_the_mirrored_result(coach, support):
     )
     here = simulate(coach, irregular, speed=15.0)
     there = simulate(mirrored_vehicle(coach), mirrored_track(irregular), speed=15.0)
-    largest = 2e-6 if support == "rigid" else SETTLED * np.mean(here.Q0)  # N
+    largest = 2e-6 if support == "rigid" else FORCE_TOLERANCE * np.mean(here.Q0)  # N
     for difference in (here.Q - there.Q[:, :, ::-1], here.Y + there.Y[:, :, ::-1]):
         assert np.max(np.abs(difference)) < largest
         assert np.median(np.abs(difference)) < 1e-6

@@ -8,14 +8,14 @@ from railsim.kernels.contact_columns import T_Y
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.state import LAST_STEP
 from railsim.kernels.transient import (
-    CARRIED,
-    CARRIES,
-    FOLLOWED,
-    LOST,
+    CARRYING,
+    DELAYED,
+    LOADED,
     PATCH_STATE,
-    PER_TIME,
+    RATE,
     TRACED,
     TRANSIENT_SIZE,
+    UNLOADED,
     transient_begin,
 )
 from railsim.model.assembly import assemble
@@ -60,11 +60,11 @@ class Patch:
         """
         now = self.work.transient
         for length in (0.0, way):
-            state[LAST_STEP] = length / now[0, 1, 0, PER_TIME] if length else 0.0
+            state[LAST_STEP] = length / now[0, 1, 0, RATE] if length else 0.0
             right_hand_side(self.system, self.work, state, np.zeros_like(state))
         patch = np.flatnonzero((self.work.patch_index == (0, 1, 0)).all(axis=1))[0]
         memory = now[..., :PATCH_STATE].ravel().copy()
-        return now[0, 1, 0, FOLLOWED + 1], self.work.patch[T_Y, patch], memory
+        return now[0, 1, 0, DELAYED + 1], self.work.patch[T_Y, patch], memory
 
 
 @pytest.fixture(scope="module")
@@ -108,9 +108,9 @@ def test_new_patch_begins_without_traction(patch):
     state = patch.turned(1e-3)
     steady, _, memory = patch.evaluate(state)
     rows = memory.reshape(-1, PATCH_STATE)
-    assert np.count_nonzero(rows[:, CARRIES] == CARRIED) == 8
-    assert np.count_nonzero(rows[:, CARRIES] == LOST) == 8 * (TRACED - 1)
-    rows[:, CARRIES] = LOST
+    assert np.count_nonzero(rows[:, LOADED] == CARRYING) == 8
+    assert np.count_nonzero(rows[:, LOADED] == UNLOADED) == 8 * (TRACED - 1)
+    rows[:, LOADED] = UNLOADED
     state[patch.kept] = rows.ravel()
     assert patch.evaluate(state)[:2] == (0.0, 0.0)
     followed, _, _ = patch.evaluate(state, 1.0)

@@ -1,4 +1,4 @@
-"""What commands, signals, controllers and laws of one's own are made of; parts of a `System`."""
+"""Records of actuators, signals, controllers and laws of one's own: parts of a `System`."""
 
 from typing import NamedTuple
 
@@ -14,11 +14,11 @@ class Actuators(NamedTuple):
     Attributes
     ----------
     body : int64[a, 2]
-    which : int64[a, WHICH_SIZE];  row : float64[a, ROW_SIZE]
+    codes : int64[a, CODES_SIZE];  row : float64[a, ROW_SIZE]
     """
 
     body: np.ndarray
-    which: np.ndarray
+    codes: np.ndarray
     row: np.ndarray
 
 
@@ -28,10 +28,10 @@ class Signals(NamedTuple):
 
     Attributes
     ----------
-    which : int64[s, SIGNAL_WHICH];  row : float64[s, SIGNAL_ROW]
+    codes : int64[s, SIGNAL_CODES];  row : float64[s, SIGNAL_ROW]
     """
 
-    which: np.ndarray
+    codes: np.ndarray
     row: np.ndarray
 
 
@@ -41,25 +41,25 @@ class Controllers(NamedTuple):
 
     Attributes
     ----------
-    which : int64[c, CONTROLLER_WHICH];  period : float64[c] [s]
-    wires : int64[...]      of each controller actuators that it commands, signals that it reads
+    codes : int64[c, CONTROLLER_CODES];  period : float64[c] [s]
+    ports : int64[...]      of each controller actuators that it commands, signals that it reads
     """
 
-    which: np.ndarray
+    codes: np.ndarray
     period: np.ndarray
-    wires: np.ndarray
+    ports: np.ndarray
 
 
 @record
-class Own(NamedTuple):
+class UserLaws(NamedTuple):
     """Laws of one's own.
 
     Attributes
     ----------
-    places : int64[l]       address of each
+    addresses : int64[l]    address of each
     memory : float64[...]   `Work.memory` at the begin of a run: time of the begin, commands,
                             samples, blocks of the laws with their parameters
     """
 
-    places: np.ndarray
+    addresses: np.ndarray
     memory: np.ndarray

@@ -21,7 +21,7 @@ def aligned_zeros(shape: int | tuple[int, ...], dtype: type = np.float64) -> NDA
     return room[first : first + size].view(dtype).reshape(shape)
 
 
-def aligned(array: NDArray[Any]) -> NDArray[Any]:
+def aligned_copy(array: NDArray[Any]) -> NDArray[Any]:
     """Copy of an array in C order, from the start of a cache line on."""
     copy = aligned_zeros(array.shape, array.dtype.type)
     copy[...] = array

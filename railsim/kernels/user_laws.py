@@ -16,7 +16,7 @@ from railsim.kernels import compiled
 
 
 @intrinsic
-def _call_at(typingctx, address, block, first):
+def _call_law(typingctx, address, block, first):
     def lower(context, builder, signature, values):
         array = context.make_array(signature.args[1])(context, builder, values[1])
         place = builder.gep(array.data, [values[2]])
@@ -27,23 +27,23 @@ def _call_at(typingctx, address, block, first):
     return types.void(types.int64, block, types.int64), lower
 
 
-def _call_plainly(address, block, first):
+def _call_uncompiled(address, block, first):
     law = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(int(address))
     law(block.ctypes.data + block.itemsize * int(first))
 
 
-call_at = _call_plainly if numba.config.DISABLE_JIT else _call_at
+call_law = _call_uncompiled if numba.config.DISABLE_JIT else _call_law
 """Call the law at an address with the block that begins at ``block[first]``."""
 
 # block of a creep law: force on the rail, moment; creepages, spin, semi-axes, friction force,
 # Kalker's coefficients, shear modulus, then the law's parameters
-CREEP_GIVES, CREEP_TAKES = 3, 11
+CREEP_RESULTS, CREEP_INPUTS = 3, 11
 # block of a friction law: factor of the friction; slip velocity, speed of travel, parameters
-FRICTION_GIVES, FRICTION_TAKES = 1, 2
+FRICTION_RESULTS, FRICTION_INPUTS = 1, 2
 
 
 @compiled(python=False)
-def own_creep_law(n, patches, law, G):
+def user_creep_law(n, patches, law, G):
     """Forces of a creep law of one's own; zero where nothing is pressed."""
     block = law.block
     for i in range(n):
@@ -54,16 +54,16 @@ def own_creep_law(n, patches, law, G):
         block[6], block[7], block[8] = patches.a[i], patches.b[i], patches.mu_N[i]
         block[9], block[10], block[11] = patches.c11[i], patches.c22[i], patches.c23[i]
         block[12], block[13] = patches.c33[i], G
-        call_at(law.own, block, 0)
+        call_law(law.user_law, block, 0)
         patches.T_x[i], patches.T_y[i], patches.M_z[i] = block[0], block[1], block[2]
 
 
 @compiled(python=False)
-def own_friction(n, patches, speed, address, block):
+def user_friction(n, patches, speed, address, block):
     """Multiply the friction of n patches by a law of the slip velocity [m/s]."""
     for i in range(n):
         xi_x, xi_y = patches.xi_x[i], patches.xi_y[i]
         block[1] = speed[i] * (xi_x * xi_x + xi_y * xi_y) ** 0.5
         block[2] = speed[i]
-        call_at(address, block, 0)
+        call_law(address, block, 0)
         patches.mu_N[i] *= block[0]
