@@ -89,34 +89,31 @@ def _gas_spring(
     """A series of a catalogue for a gas spring: its stroke, force and length."""
     n = result.model.number
     lengths = result.extremes(f"{name}_length")
-    F1, unlock = float(n(spring.F1)), n(row.unlock)
+    F1, unlock, extended = float(n(spring.F1)), n(row.unlock), n(spring.extended)
     needed = lengths.most - lengths.least + unlock
-    strokes = _strokes(result, row, needed)
+    stroke = _stroke(result, row, needed)
+    largest = max(map(n, row.stroke or row.strokes or ())) * 1e3
     why = []
     low, high = (n(f) for f in row.F1)
     if not low <= F1 <= high:
         why.append(f"F1 {F1:g} N is not within {low:g} to {high:g} N")
-    if not strokes:
-        largest = n(row.stroke[1]) if row.stroke is not None else max(map(n, row.strokes or (0.0,)))
-        why.append(f"stroke {needed * 1e3:.1f} mm is needed, {largest * 1e3:g} mm the largest")
-    stroke = strokes[0] if strokes else None
-    extended = n(spring.extended)
-    if stroke is not None and row.extended is not None:
+    if stroke is None:
+        why.append(f"stroke {needed * 1e3:.1f} mm is needed, {largest:g} mm the largest")
+    elif row.extended is not None:
         factor, constant = (n(x) for x in row.extended)
-        longest, shortest = lengths.most + unlock, lengths.least * (1.0 + ROUNDING)
-        long = (c for c in strokes if factor * c + constant >= longest * (1.0 - ROUNDING))
-        stroke = next((c for c in long if (factor - 1.0) * c + constant <= shortest), None)
-        if stroke is None:
+        stroke = _stroke(result, row, max(needed, (lengths.most + unlock - constant) / factor))
+        shortest = lengths.least * (1.0 + ROUNDING)
+        if stroke is None or (factor - 1.0) * stroke + constant > shortest:
             least, most = lengths.least * 1e3, lengths.most * 1e3
             why.append(f"{least:.1f} to {most:.1f} mm is no range of its lengths")
         else:
             extended = factor * stroke + constant
-    elif stroke is not None:
+    else:
         # made to the length that the file asks for: what it is compressed by must be in the stroke
         compressed = extended - lengths.least
-        stroke = next((c for c in strokes if c >= compressed * (1.0 - ROUNDING)), None)
+        stroke = _stroke(result, row, max(needed, compressed))
         if stroke is None:
-            why.append(f"compressed by {compressed * 1e3:.1f} mm, {strokes[-1] * 1e3:g} mm at most")
+            why.append(f"compressed by {compressed * 1e3:.1f} mm, {largest:g} mm at most")
     notes = [] if stroke is None else [f"stroke {stroke * 1e3:.4g} mm"]
     stated = [n(limit) for limit, _, _ in row.F1_tolerance or ()]
     if stated and max(stated) < F1:
@@ -127,14 +124,14 @@ def _gas_spring(
     return Choice(catalogue, f"{name}: {row.name}", not why, tuple(why or notes), values)
 
 
-def _strokes(result: Analysis, row: CatalogueRow, needed: float) -> list[float]:
-    """Strokes of a row that are long enough, the shortest first; of a range some more."""
+def _stroke(result: Analysis, row: CatalogueRow, needed: float) -> float | None:
+    """Shortest stroke of a row that is long enough [m]; None where none is."""
     n, enough = result.model.number, needed * (1.0 - ROUNDING)
     if row.strokes is not None:
-        return sorted(n(s) for s in row.strokes if n(s) >= enough)
+        return next_size([n(s) for s in row.strokes], enough)
     assert row.stroke is not None
     low, high = n(row.stroke[0]), n(row.stroke[1])
-    return [] if enough > high else list(np.linspace(np.clip(needed, low, high), high, 101))
+    return None if enough > high else float(np.clip(needed, low, high))
 
 
 def _with_row(

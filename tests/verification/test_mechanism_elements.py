@@ -257,6 +257,8 @@ def test_a_gas_spring_fits_that_is_used_over_all_its_stroke(load, start):
     rows = {
         "of its length": f"strokes = [0.3], extended = [1.0, {least}]",
         "of a range": f"stroke = [0.1, 0.3], extended = [1.0, {least}]",
+        # from 310 mm, extended as long as the slide goes, to 320 mm, pressed as short
+        "of a wide range": f"stroke = [0.1, 3.0], extended = [2.0, {0.38 - start}]",
         "made to length": "strokes = [0.3]",
         "1 mm less": f"strokes = [0.299], extended = [1.0, {least}]",
         "1 mm longer": f"strokes = [0.3], extended = [1.0, {least + 0.001}]",
@@ -267,8 +269,10 @@ def test_a_gas_spring_fits_that_is_used_over_all_its_stroke(load, start):
     text = f'{SLIDE}{catalogue}[[selection]]\nelement = "gas"\ncatalogue = "c"\n'
     changes = [f"{key}={start}" for key in ("start.slide.x", "driver.start")]
     changes += [f"driver.end={start + 0.3}", f"elements.gas.extended={1.0 - start}"]
-    found = {c.name.partition(": ")[2]: c.fits for c in selection(analyse(load(text, *changes)))}
-    assert {name: found[name] for name in rows} == {n: not n.startswith("1 mm") for n in rows}
+    chosen = selection(analyse(load(text, *changes)))
+    found = {c.name.partition(": ")[2]: c for c in chosen if c.catalogue == "c"}
+    assert {n: c.fits for n, c in found.items()} == {n: not n.startswith("1 mm") for n in rows}
+    assert found["of a wide range"].values["stroke"] == pytest.approx(0.31)
 
 
 def test_tolerance_of_F1_and_locks_of_the_source():

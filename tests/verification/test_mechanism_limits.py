@@ -402,6 +402,7 @@ WORK, HIGH = "parameters.zone_work", "parameters.zone_high"
         ("tilting_one_spring", "elements.front.rod={}", TINY, 0.0),  # was divided by
         ("tilting_one_spring", "catalogues.vapsint.AG.rod={}", TINY, 0.0),
         ("tilting_one_spring", "catalogues.vapsint.AG.progression={}", 1.0, 0.99),
+        ("tilting_one_spring", "catalogues.airax.0.extended=[{},0.085]", 1.0, 0.99),
         ("tilting_one_spring", "catalogues.vapsint.AG.F1=[800.0,{}]", 800.0, 100.0),
         ("tilting_one_spring", "catalogues.vapsint.AG.F1=[{},800.0]", TINY, 0.0),
         ("tilting_one_spring", "catalogues.vapsint.AG.stroke=[0.1,{}]", 0.1, 0.09),

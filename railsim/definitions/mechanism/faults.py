@@ -281,6 +281,9 @@ def _row_faults(key: str, row: CatalogueRow, values: Mapping[str, Any]) -> Itera
             found = [number(q, values) for q in quantities]
             if not found or min(found) <= 0.0 or (allowed is pair and found != sorted(found)):
                 yield _fault(f"{key}.{field}", ", ".join(map("{:g}".format, found)), allowed)
+    if row.extended is not None and (factor := number(row.extended[0], values)) < 1.0:
+        allowed = "1 or greater: pressed by its stroke, it still has a length"
+        yield _fault(f"{key}.extended.0", f"{factor:g}", allowed)
     for k, band in enumerate(row.F1_tolerance or ()):
         found = [number(q, values) for q in band]
         if found[0] <= 0.0 or min(found) < 0.0:
