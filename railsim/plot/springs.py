@@ -69,7 +69,7 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
         axes.plot(load, curve[name] * SCALES[name], color=MAIN)
         _mark(axes, result, "load", name)
     deflection.set_ylabel("deflection $\\Delta z$ (mm)")
-    rotation.axhline(0.0, color=FAINT, lw=0.8)
+    rotation.axhline(0.0, color=FAINT, lw=0.8, zorder=1)
     rotation.set_ylabel("rotation of the arm (°)")
     solid = solid_heights(suspension)
     for i, name in enumerate(suspension.springs):
@@ -170,7 +170,8 @@ def search_figure(result: "SearchResult") -> Figure:
     margin = [nest.fatigue_margin for nest in result.nests]
     axes.plot(mass, margin, "o", color=MAIN, ms=5, label="ranked nests, as built", zorder=2)
     for rank, point in enumerate(zip(mass, margin, strict=True), start=1):
-        note(axes, str(rank), point, (4, 3), fontsize=8, color=MAIN)
+        where = ((0, 4), "center", "bottom") if rank % 2 else ((0, -4), "center", "top")
+        note(axes, str(rank), point, *where, fontsize=8, color=MAIN)
     axes.set(xlabel="mass of the nest (kg)", ylabel="fatigue margin")
     axes.legend(loc="best")
     return figure
@@ -235,11 +236,16 @@ def _curve(result: Verification) -> dict[str, Floats]:
 
 
 def _mark(axes: Axes, result: Verification, over: str, quantity: str) -> None:
-    """Mark the load cases on a rising curve, their names above and below it in turn."""
-    for i, case in enumerate(sorted(result.cases, key=lambda case: getattr(case, over))):
+    """Mark the load cases on a rising curve, their names below and above it in turn.
+
+    The first name is right of its mark and the last one left: beyond them there is no room.
+    """
+    cases = sorted(result.cases, key=lambda case: getattr(case, over))
+    for i, case in enumerate(cases, start=1):
         point = getattr(case, over) * SCALES[over], getattr(case, quantity) * SCALES[quantity]
         axes.plot(*point, "o", color=MAIN, ms=4)
-        where = ((4, -3), "left", "top") if i % 2 else ((-4, 3), "right", "bottom")
+        right = i % 2 and i < len(cases)
+        where = ((4, -3), "left", "top") if right else ((-4, 3), "right", "bottom")
         note(axes, unformatted(case.name), point, *where, **NAMES)
 
 

@@ -10,7 +10,12 @@ from selection import points
 
 from railsim.definitions.loading import load_spring
 from railsim.errors import InputError
-from railsim.plot.springs import goodman_figure, ride_height_figure, stiffness_figure
+from railsim.plot.springs import (
+    deflection_figure,
+    goodman_figure,
+    ride_height_figure,
+    stiffness_figure,
+)
 from railsim.springs import checks
 from railsim.springs.design import design
 from railsim.springs.summary import design_data, fatigue_data, ride_height_data, verification_data
@@ -242,3 +247,16 @@ def test_ride_heights_are_drawn_from_the_least_deviation_to_the_largest():
     ends = [line.get_ydata() for line in every.lines if len(line.get_ydata()) == 2][:4]
     assert np.array(ends) == pytest.approx(np.array([[-6, 7], [-3, 3], [-8, 9], [-5, 5]]))
     assert every.get_ylim()[1] > 9.0
+
+
+def test_names_of_the_loads_stay_within_the_axes():
+    """The first was written over the scale to the left of it."""
+    suspension = load_spring("tare_laden_example")
+    figure = deflection_figure(suspension, verify(suspension))
+    figure.draw_without_rendering()
+    for axes in figure.axes[:2]:
+        edges = axes.get_window_extent()
+        assert len(axes.texts) == 4
+        for text in axes.texts:
+            written = text.get_window_extent()
+            assert edges.x0 < written.x0 < written.x1 < edges.x1, text.get_text()
