@@ -145,9 +145,7 @@ class Analysis:
         self.result(quantity)
         dense, values = self._dense[0], self._dense[1][quantity]
         low, high = np.nanmin(values), np.nanmax(values)
-        level = (values[1:] == value) & (values[:-1] == value)
-        s = zeros(dense, lambda motion: outputs(motion)[quantity] - value)
-        s = [x for x in s if x not in dense.s[1:][level]] or [self.model.start]
+        s = zeros(dense, lambda motion: outputs(motion)[quantity] - value) or [self.model.start]
         results = outputs(solve(self.model, s))
         # where it jumps over the value it does not have it
         near = 1e-6 * max(high - low, abs(value))

@@ -17,6 +17,7 @@ from railsim.mechanisms.assembly import constraints
 from railsim.mechanisms.kinematics import Motion, solve
 
 HALVINGS = 48
+STILL = 1e-6  # share of the largest rate of a roller below which it stands still
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Transition:
     before: int  # arcs, counted from 1 in the order of the file
     after: int
     gap: float  # distance by which the arc after misses the roller's centre: 0 if tangent [m]
-    rate_before: float  # of the roller's body, dtheta/ds, on either arc
+    rate_before: float  # of the roller's centre, dr/ds, on either arc [m/rad or 1]
     rate_after: float
 
 
@@ -66,16 +67,21 @@ def _transition(dense: Motion, joint: str, row: int, k: int) -> Transition:
         else:
             high = middle
     at = solve(model, [low])
-    turn = 3 * (roller_body(dense, joint) - 1) + 2
+    centre = model.definition.joints[joint].cam  # type: ignore[union-attr]
     rates, unit = [], np.eye(3 * model.linkage.n_bodies)[-1]  # of the driver
     for arc in (before, after):
         arcs = at.arcs[0].copy()
         arcs[row] = arc
         residual, jacobian = constraints(model, low, at.q[0], arcs)
-        rates.append(float(np.linalg.solve(jacobian, unit)[turn]))
+        q1 = np.append(np.zeros(3), np.linalg.solve(jacobian, unit)).reshape(at.q1.shape)
+        rates.append(replace(at, q1=q1, known={}).point(centre)[1][0])
+    along = max(rates, key=np.linalg.norm)
+    size, largest = np.linalg.norm(along), np.max(np.abs(dense.point(centre)[1]))
+    along = along / size if size > STILL * largest else 0.0 * along
     earlier = int(model.linkage.joint[row, 4]) - 1
     gap = abs(float(residual[model.linkage.joint[row, 3]]))
-    return Transition(joint, low, before - earlier, after - earlier, gap, *rates)
+    speeds = (float(rate @ along) for rate in rates)
+    return Transition(joint, low, before - earlier, after - earlier, gap, *speeds)
 
 
 def on_one_arc(motion: Motion, row: int, arc: int, beyond: float) -> Motion | None:

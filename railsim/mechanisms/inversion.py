@@ -68,29 +68,27 @@ def _refine(
 
 
 def zeros(motion: Motion, function: Callable[[Motion], Any]) -> list[float]:
-    """All values of the driver at which a function of the motion, not always smooth, is zero."""
+    """All values of the driver at which a function of the motion, not always smooth, is zero.
+
+    Of a stretch on which it is zero, the first position.
+    """
     known = np.asarray(function(motion))
     # the known ones again, or rounding may give a zero at a position the sign of the other end
     values: dict[float, float] = dict(zip(motion.s.tolist(), known.tolist(), strict=True))
-    roots = []
+    none = known == 0.0
+    roots: list[float] = motion.s[none & ~np.append(False, none[:-1])].tolist()
 
     def value_at(s: float) -> float:
         if s not in values:
             values[s] = float(np.ravel(function(solve(motion.model, [s])))[0])
         return values[s]
 
-    for k in range(len(known) - 1):
-        a, b = known[k], known[k + 1]
-        if a == 0.0:
-            roots.append(float(motion.s[k]))
-        elif a * b < 0.0:
-            from scipy.optimize import brentq  # imported where it is needed: it takes a while
+    for k in np.flatnonzero(known[:-1] * known[1:] < 0.0):
+        from scipy.optimize import brentq  # imported where it is needed: it takes a while
 
-            span = abs(motion.model.end - motion.model.start)
-            roots.append(float(brentq(value_at, motion.s[k], motion.s[k + 1], xtol=1e-12 * span)))
-    if len(known) and known[-1] == 0.0:
-        roots.append(float(motion.s[-1]))
-    return roots
+        span = abs(motion.model.end - motion.model.start)
+        roots.append(float(brentq(value_at, motion.s[k], motion.s[k + 1], xtol=1e-12 * span)))
+    return sorted(roots, reverse=bool(motion.s[-1] < motion.s[0]))
 
 
 def largest(motion: Motion, function: Callable[[Motion], Any], known: Any) -> tuple[float, float]:

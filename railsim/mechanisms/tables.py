@@ -145,7 +145,8 @@ def sentences(result: Analysis) -> list[str]:
             f"no position of rest from {driver(result.model.start)} to {driver(result.model.end)}"
         )
     for change in result.transitions:
-        jump = change.rate_after / change.rate_before - 1.0
+        before, after = change.rate_before, change.rate_after
+        jump = (after - before) / (max(abs(before), abs(after)) or 1.0)
         arcs = f"from arc {change.before} to {change.after} at {driver(change.travel)}"
         sizes = f"gap {change.gap * 1e3:.4f} mm, jump of the rate {jump * 100.0:z.3f} %"
         found.append(f"{change.joint}: {arcs}, {sizes}")
