@@ -18,6 +18,11 @@ Row = tuple[base.NonNegative, base.Positive]
 
 
 TARE = "ODM"  # usual name of the tare load; not looked for where nothing uses it
+LARGEST = 50.0  # m; no part of a suspension is nearly as large
+LENGTHS = (
+    *("length", "seat_height", "mean_diameter", "free_height", "wire_diameter", "engagement"),
+    *("deflection", "outer_diameter_max", "wheel_radius", "lateral_position"),
+)
 _NUMBER = {"type": "number", "exclusiveMinimum": 0}
 _ROW = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 
@@ -304,7 +309,8 @@ class TrailingArmSuspension(FileDefinition):
 
     def contradictions(self) -> list[Fault]:
         """Return what is wrong between the parts."""
-        return [*_load_faults(self), *_inner_faults(self), *_tolerance_faults(self)]
+        wrong = [*_load_faults(self), *_inner_faults(self), *_tolerance_faults(self)]
+        return [*_size_faults(self)] or wrong  # which follows from a length in millimetres
 
     def unusual(self) -> list[base.Remark]:
         """Return what is allowed but unusual."""
@@ -334,6 +340,17 @@ class TrailingArmSuspension(FileDefinition):
             return (self.arm.seat_height,)
         raised = self.outer.free_height - self.inner.free_height - self.engagement
         return (self.arm.seat_height, self.arm.seat_height + raised)
+
+
+def _size_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
+    """Lengths that look like millimetres."""
+    for table in ("arm", "outer", "inner", "mounting", "target", "search", "vehicle"):
+        part = getattr(suspension, table)
+        for key in LENGTHS:
+            value = getattr(part, key, None) or 0.0
+            largest = max(value) if isinstance(value, tuple) else value
+            if largest >= LARGEST:
+                yield Fault("", f"{table}.{key}", f"{largest:g} m", "lengths in metres")
 
 
 def _load_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:

@@ -82,7 +82,8 @@ def published_table(result: Analysis) -> Table:
         if name in ("travel", "max_force", "min_force"):
             unit = quantity(name.rpartition("_")[2], result.definition).si_unit
         cells = [with_unit(both[key], unit, 8) for key in ("published", "ours")]
-        rows.append([name, *cells, both["ours"] / both["published"] - 1.0])
+        difference = both["ours"] / both["published"] - 1.0 if both["published"] else None
+        rows.append([name, *cells, difference])
     numbers = [Column("published", format=">"), Column("computed", format=">")]
     return Table(["result", *numbers, Column("relative difference", format="+.1e")], rows)
 

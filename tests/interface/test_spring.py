@@ -168,6 +168,10 @@ def test_tables_for_people(capsys):
         ("fatigue", ["fatigue.goodman=[[0.0, 4e8]]"], "fatigue.goodman", ""),
         # kg/mm2 in place of Pa
         ("verify", ["material.G=8000", "material.E=21000"], "mounting.load", "solid height"),
+        # mm in place of m: a coil of 0.0000 turns was designed, an arm of 400 m verified
+        ("design", ["outer.mean_diameter=230"], "outer.mean_diameter", "230 m; lengths in metres"),
+        ("verify", ["arm.length=400"], "arm.length", "400 m; lengths in metres"),
+        ("verify", ["search.free_height=[0.3, 350]"], "search.free_height", "350 m; lengths in"),
         ("verify", ["tolerances.wire_diameter=0.03"], "tolerances.wire_diameter", "0.027; less"),
         ("verify", ["tolerances.active_coils=4"], "tolerances.active_coils", "is 3.6; less"),
     ],

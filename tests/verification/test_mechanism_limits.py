@@ -485,6 +485,8 @@ mass = [50.0, 150.0]
     assert by_name(result)["available_force"].unit == "N m"
     assert {one.unit for one in scatter(result.definition)} == {"N m"}
     assert "981 N m" in str(published_table(result))
+    none = analyse(arm(TORQUE, 0.0, more="[published]\nmin_force = 0.0"))  # was divided by
+    assert str(published_table(none)).splitlines()[-1].split()[:4] == ["min_force", "0", "N", "m"]
     assert published_data(result)["max_force"]["published"] == 981.0
     assert "largest force (N m)" in str(comparison_table([result, result]))
     by_force = analyse(load_mechanism("tilting_one_spring"))
