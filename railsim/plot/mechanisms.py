@@ -238,7 +238,10 @@ def angles_figure(result: Analysis) -> Figure:
 
 @style.styled()
 def cam_figure(result: Analysis) -> Figure:
-    """Rate of the rocker on every arc of the cam, with the transitions."""
+    """Rate of the driver over the rocker's on every arc of the cam, with the transitions.
+
+    Of a roller that slides, or rests on the way, the rate of its centre over the driver's.
+    """
     motion = result.motion
     name, row = next(iter(cam_rows(motion).items()))
     cam = result.definition.joints[name]
@@ -249,21 +252,30 @@ def cam_figure(result: Analysis) -> Figure:
     beyond = 0.12 * abs(result.travel)
     figure, axes = style.single(7.0, 3.6)
     travel = values_of("travel", result)
-    rate = motion.q1[:, body, 2]
-    roller = cam.cam.partition(".")[0]
-    unit = "" if result.definition.driver.angle is not None else " (m/rad)"
-    words = f"rate of the driver over that of '{roller}'{unit}"
+    turning = np.abs(motion.q1[:, body, 2])
+    rocks = bool(np.min(turning) > 1e-6 * np.max(turning))
+    angular = result.definition.driver.angle is not None
+    words = f"rate of the driver over that of '{cam.cam.partition('.')[0]}'"
+    words += "" if angular else " (m/rad)"
+    if not rocks:
+        words = f"rate of '{cam.cam}' over the driver's" + (" (mm/rad)" if angular else "")
+
+    def rate(on_arcs: Motion) -> Floats:
+        if rocks:
+            return np.abs(1.0 / on_arcs.q1[:, body, 2])
+        speed: Floats = np.linalg.norm(on_arcs.point(cam.cam)[1], axis=-1)
+        return 1e3 * speed if angular else speed
+
     for i, arc in enumerate(np.unique(motion.arcs[:, row])):
         on = motion.arcs[:, row] == arc
         label = f"arc {arc - first + 1}, turns {cam.arcs[arc - first].turns}"
-        axes.plot(travel[on], np.abs(1.0 / rate[on]), label=label, lw=2.2, **line_style(i))
+        axes.plot(travel[on], rate(motion)[on], label=label, lw=2.2, **line_style(i))
         if (alone := on_one_arc(motion, row, int(arc), beyond)) is not None:
-            more = np.abs(1.0 / alone.q1[:, body, 2])
-            axes.plot(alone.s * scale, more, color="0.45", lw=0.8, ls=DASHES[i], zorder=1)
+            axes.plot(alone.s * scale, rate(alone), color="0.45", lw=0.8, ls=DASHES[i], zorder=1)
     for change in result.transitions:
         at = change.travel * scale
         axes.axvline(at, color="0.4", lw=0.8)
-        value = f"{at:.2f}°" if scale > 1e2 or not unit else f"{at:.2f} mm"
+        value = f"{at:.2f}°" if angular else f"{at:.2f} mm"
         style.note(axes, value, (at, 1.0), (3, -10), frame=style.ABOVE, fontsize=8, color="k")
     mark_zone(axes, result, "travel")
     axes.set(xlabel=label_of("travel", result, "driver"), ylabel=words)

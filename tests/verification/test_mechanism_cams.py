@@ -6,6 +6,7 @@ import pytest
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.tables import sentences
+from railsim.plot.mechanisms import cam_figure
 
 BASE, FLANK, NOSE, APART, ASIDE = 0.050, 0.130, 0.025, 0.030, 0.004  # of the roller's centre [m]
 ALONG = ((FLANK - BASE) ** 2 - (FLANK - NOSE) ** 2 + APART**2) / (2.0 * APART)
@@ -73,3 +74,13 @@ def test_of_a_stretch_without_force_only_the_begin_is_told(result):
     """Every position of the table was, of the half of them at which the cam's base circle rolls."""
     highest = np.arccos(ASIDE / (APART + NOSE))  # the nose's centre below the roller's
     assert result.force_zeros == pytest.approx([result.model.start, highest])
+
+
+def test_rates_of_a_roller_that_slides_are_drawn(result):
+    """The picture was empty: the rate over that of a body that does not turn."""
+    (axes,) = cam_figure(result).axes
+    assert axes.get_ylabel() == "rate of 'follower.roller' over the driver's (mm/rad)"
+    by_arc = {line.get_label(): line.get_data() for line in axes.lines}
+    for arc in range(3):
+        angle, rate = by_arc[f"arc {arc + 1}, turns right"]
+        assert rate == pytest.approx(1e3 * np.abs(lift(arc, np.radians(angle))[1]), abs=1e-9)
