@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from railsim.definitions.mechanism.parts import Cam
-from railsim.definitions.mechanism.values import body_name
 from railsim.errors import InputError
 from railsim.kernels import linkage as kernel
 from railsim.mechanisms.assembly import constraints
@@ -38,13 +37,6 @@ def cam_rows(motion: Motion) -> dict[str, int]:
     names = [n for n, j in motion.model.definition.joints.items() if isinstance(j, Cam)]
     rows = np.flatnonzero(motion.model.linkage.joint[:, 0] == kernel.CAM)
     return dict(zip(names, map(int, rows), strict=True))
-
-
-def roller_body(motion: Motion, joint: str) -> int:
-    """Number of the body that carries the roller of a cam."""
-    cam = motion.model.definition.joints[joint]
-    assert isinstance(cam, Cam)
-    return motion.model.bodies[body_name(cam.cam)]
 
 
 def transitions(dense: Motion) -> tuple[Transition, ...]:

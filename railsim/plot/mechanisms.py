@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from railsim.arrays import Floats
 from railsim.definitions.mechanism.parts import AirSpring, Cam
 from railsim.mechanisms.analysis import Analysis
-from railsim.mechanisms.cams import cam_rows, on_one_arc, roller_body
+from railsim.mechanisms.cams import cam_rows, on_one_arc
 from railsim.mechanisms.drawing import Line, centres, joint_points, lines, points, working_box
 from railsim.mechanisms.dynamics import driving_actuator
 from railsim.mechanisms.forces import table_of
@@ -238,15 +238,12 @@ def angles_figure(result: Analysis) -> Figure:
 
 @style.styled()
 def cam_figure(result: Analysis) -> Figure:
-    """Rate of the driver over the rocker's on every arc of the cam, with the transitions.
-
-    Of a roller that slides, or rests on the way, the rate of its centre over the driver's.
-    """
+    """Rates on every arc of the cam: of a rocker, or of a roller that slides or rests."""
     motion = result.motion
     name, row = next(iter(cam_rows(motion).items()))
     cam = result.definition.joints[name]
     assert isinstance(cam, Cam)
-    body = roller_body(motion, name)
+    body = result.model.linkage.point_body[result.model.points[cam.cam]]
     first = int(result.model.linkage.joint[row, 4])
     scale = quantity("travel", result.definition).scale
     beyond = 0.12 * abs(result.travel)
@@ -255,16 +252,14 @@ def cam_figure(result: Analysis) -> Figure:
     turning = np.abs(motion.q1[:, body, 2])
     rocks = bool(np.min(turning) > 1e-6 * np.max(turning))
     angular = result.definition.driver.angle is not None
-    words = f"rate of the driver over that of '{cam.cam.partition('.')[0]}'"
-    words += "" if angular else " (m/rad)"
-    if not rocks:
-        words = f"rate of '{cam.cam}' over the driver's" + (" (mm/rad)" if angular else "")
+    words = f"rate of '{cam.cam}' over the driver's (mm/{'rad' if angular else 'm'})"
+    if rocks:
+        roller = cam.cam.partition(".")[0]
+        words = f"rate of the driver over that of '{roller}'{'' if angular else ' (m/rad)'}"
 
-    def rate(on_arcs: Motion) -> Floats:
-        if rocks:
-            return np.abs(1.0 / on_arcs.q1[:, body, 2])
-        speed: Floats = np.linalg.norm(on_arcs.point(cam.cam)[1], axis=-1)
-        return 1e3 * speed if angular else speed
+    def rate(at: Motion) -> Any:
+        speed = np.linalg.norm(at.point(cam.cam)[1], axis=-1)
+        return np.abs(1.0 / at.q1[:, body, 2]) if rocks else 1e3 * speed
 
     for i, arc in enumerate(np.unique(motion.arcs[:, row])):
         on = motion.arcs[:, row] == arc
