@@ -147,14 +147,11 @@ def points(motion: Motion) -> dict[str, Floats]:
 def joint_points(motion: Motion) -> dict[str, str]:
     """The name under which each point is shown: points held together have one, by first point."""
     labels: dict[str, str] = {}
-    by_name = points(motion)
-    taken: list[tuple[Floats, str]] = []
-    size = float(motion.model.linkage.size)
+    by_name, near = points(motion), 1e-9 * float(motion.model.linkage.size)
     for name, xy in by_name.items():
-        same = [other for position, other in taken if np.max(np.abs(position - xy)) < 1e-9 * size]
-        labels[name] = same[0] if same else name
-        if not same:
-            taken.append((xy, name))
+        firsts = dict.fromkeys(labels.values())
+        same = (first for first in firsts if np.max(np.abs(by_name[first] - xy)) < near)
+        labels[name] = next(same, name)
     return labels
 
 

@@ -236,10 +236,7 @@ def _curve(result: Verification) -> dict[str, Floats]:
 
 
 def _mark(axes: Axes, result: Verification, over: str, quantity: str) -> None:
-    """Mark the load cases on a rising curve, their names below and above it in turn.
-
-    The first name is right of its mark and the last one left: beyond them there is no room.
-    """
+    """Mark the load cases on a rising curve, names below and above in turn, both ends inwards."""
     cases = sorted(result.cases, key=lambda case: getattr(case, over))
     for i, case in enumerate(cases, start=1):
         point = getattr(case, over) * SCALES[over], getattr(case, quantity) * SCALES[quantity]

@@ -210,10 +210,8 @@ def dynamic_loads(suspension: TrailingArmSuspension) -> dict[str, float]:
 
 def stress(spring: HelicalSpring, state: CoilState) -> float:
     """Largest corrected shear stress of a spring under load [Pa]."""
-    shear = state.K_L * state.lateral
-    dimensions = (wire_and_coils(spring)[0], spring.mean_diameter)
-    under = state.force, shear, state.height, state.lateral
-    return float(checks.corrected_stress(*dimensions, *under))
+    under = state.force, state.K_L * state.lateral, state.height, state.lateral
+    return float(checks.corrected_stress(wire_and_coils(spring)[0], spring.mean_diameter, *under))
 
 
 def _obstacle(
