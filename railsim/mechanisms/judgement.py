@@ -47,11 +47,10 @@ class Judgement:
 
     residuals: Floats  # of the sum of squares, (residual,)
     jacobian: Floats  # (residual, parameter)
-    peak: float  # what is added to the sum of squares
-    peak_gradient: Floats  # (parameter,)
+    amounts: Floats  # whose largest is added to the sum of squares, (position,)
+    amount_slopes: Floats  # (position, parameter)
     margins: Floats  # in units of each constraint's scale; negative where broken, (constraint,)
     slopes: Floats  # (constraint, parameter)
-    rivals: Floats | None = None  # gradients of all positions with such a peak, (rival, parameter)
     firm: Any = False  # constraints without which nothing moves, (constraint,)
 
     @property
@@ -60,10 +59,20 @@ class Judgement:
         return float(self.residuals @ self.residuals) + self.peak
 
     @property
-    def gradient(self) -> Floats:
-        """Its derivatives by the parameters."""
-        found: Floats = 2.0 * self.jacobian.T @ self.residuals + self.peak_gradient
+    def peak(self) -> float:
+        """What is added to the sum of squares."""
+        return float(np.max(self.amounts))
+
+    @property
+    def square_gradient(self) -> Floats:
+        """Derivatives of the sum of squares by the parameters."""
+        found: Floats = 2.0 * self.jacobian.T @ self.residuals
         return found
+
+    @property
+    def rivals(self) -> Floats:
+        """Gradients of all positions with as large an amount, (rival, parameter)."""
+        return self.amount_slopes[self.amounts >= (1.0 - RIVAL) * self.peak]
 
     @property
     def violation(self) -> float:
@@ -213,16 +222,15 @@ class Judge:
         whole = [force[..., grid]]
         if self.rubs:
             whole.append(self._force(motion, -1)[..., grid])
-        residuals, peaks = self._objective(
+        residuals, amounts = self._objective(
             height, ratio, force_zone, np.concatenate(whole, axis=-1)
         )
         margins = self._margins(motion, grid)
-        sizes, rivals = np.real(peaks[0]), derivative(peaks).T
-        k = int(np.argmax(sizes))
+        firm = np.array([is_firm(name) for name, _ in self.labels], dtype=bool)
         return Judgement(
-            np.real(residuals)[0], derivative(residuals).T, float(sizes[k]), rivals[k],
-            np.real(margins)[0], derivative(margins).T, rivals[sizes >= (1.0 - RIVAL) * sizes[k]],
-            np.array([is_firm(name) for name, _ in self.labels], dtype=bool),
+            np.real(residuals)[0], derivative(residuals).T,
+            np.real(amounts)[0], derivative(amounts).T,
+            np.real(margins)[0], derivative(margins).T, firm,
         )  # fmt: skip
 
     def _at_height(

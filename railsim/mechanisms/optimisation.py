@@ -3,7 +3,8 @@
 Each start runs sequential least-squares programming (D. Kraft, A software package for sequential
 quadratic programming, DFVLR-FB 88-28, 1988; scipy's SLSQP) in coordinates in which the Gauss-Newton
 matrix of the sum of squares is the unit matrix, set again until nothing improves: the quasi-Newton
-updates then begin with the right curvature.
+updates then begin with the right curvature.  A largest amount is a further variable that no
+position may exceed: where two positions are equal it has no gradient.
 """
 
 from collections.abc import Sequence
@@ -170,7 +171,7 @@ class _Problem:
             self.evaluations += 1
             try:
                 found = self.judge(self.judge.lower + u * self.span, self.choice, self.extra)
-                names = "jacobian", "peak_gradient", "slopes"
+                names = "jacobian", "amount_slopes", "slopes"
                 by_u = {name: getattr(found, name) * self.span for name in names}
                 self.known = key, replace(found, **by_u)
             except InputError:
@@ -257,32 +258,40 @@ def _round(problem: _Problem, u0: Floats, here: Judgement, steps: int) -> Floats
     R = np.linalg.qr(np.vstack((J, damping * np.eye(m))), mode="r")
     S = np.linalg.inv(R)
 
-    def judgement_at(z: Floats) -> Judgement | None:
-        return problem(np.clip(u0 + S @ z, 0.0, 1.0))
+    bounded = here.amounts.size * (here.peak > 0.0)  # by a variable y[m], in units of `scale`
+    further = np.zeros(min(bounded, 1))
 
-    def objective(z: Floats) -> float:
-        found = judgement_at(z)
-        return REFUSED if found is None else found.objective / scale
+    def judgement_at(y: Floats) -> Judgement | None:
+        return problem(np.clip(u0 + S @ y[:m], 0.0, 1.0))
 
-    def gradient(z: Floats) -> Floats:
-        found = judgement_at(z)
-        slope: Floats = S.T @ (here if found is None else found).gradient / scale
-        return slope
+    def objective(y: Floats) -> float:
+        found = judgement_at(y)
+        if found is None:
+            return REFUSED
+        return float(found.residuals @ found.residuals / scale + np.sum(y[m:]))
 
-    def margins(z: Floats) -> Floats:
-        found = judgement_at(z)
-        u = u0 + S @ z
+    def gradient(y: Floats) -> Floats:
+        slope = S.T @ (judgement_at(y) or here).square_gradient / scale
+        return np.append(slope, further + 1.0)
+
+    def margins(y: Floats) -> Floats:
+        found = judgement_at(y)
+        u = u0 + S @ y[:m]
         inner = -np.ones_like(here.margins) if found is None else found.margins
-        return np.concatenate((inner, u, 1.0 - u))
+        below = np.sum(y[m:]) - (found or here).amounts[:bounded] / scale
+        return np.concatenate((inner, u, 1.0 - u, below))
 
-    def slopes(z: Floats) -> Floats:
-        known = judgement_at(z) or here
-        return np.vstack((known.slopes @ S, S, -S))
+    def slopes(y: Floats) -> Floats:
+        known = judgement_at(y) or here
+        rows = np.vstack((known.slopes @ S, S, -S, -known.amount_slopes[:bounded] @ S / scale))
+        column = np.repeat((0.0, 1.0), (len(rows) - bounded, bounded))
+        return np.column_stack((rows, column))[:, : m + len(further)]
 
     inequality: Any = {"type": "ineq", "fun": margins, "jac": slopes}
     how: Any = {"method": "SLSQP", "options": {"maxiter": steps, "ftol": 1e-10}}
-    found: Any = minimize(objective, np.zeros(m), jac=gradient, constraints=inequality, **how)
-    end: Floats = np.clip(u0 + S @ found.x, 0.0, 1.0)
+    begin = np.append(np.zeros(m), further + here.peak / scale)
+    found: Any = minimize(objective, begin, jac=gradient, constraints=inequality, **how)
+    end: Floats = np.clip(u0 + S @ found.x[:m], 0.0, 1.0)
     return end
 
 

@@ -143,8 +143,7 @@ def _active(judge: Judge, judgement: Judgement, x: Floats) -> tuple[Active, ...]
     norms = np.linalg.norm(matrix, axis=0)
     norms[norms == 0.0] = 1.0
     # where several positions have the largest force, a mean of their gradients is in balance
-    smooth, rivals = judgement.gradient - judgement.peak_gradient, judgement.rivals
-    peaks = ((smooth if rivals is None else smooth + rivals) * span).reshape(-1, len(x)).T
+    peaks = ((judgement.square_gradient + judgement.rivals) * span).T
     large = 1e3 * float(np.linalg.norm(peaks)) or 1.0
     sums = np.repeat((0.0, large), (len(rows), peaks.shape[1]))
     both = np.vstack((np.hstack((matrix / norms, -peaks)), sums))

@@ -131,7 +131,8 @@ mass = [50.0, 150.0]
     judged = judge(np.array([100.0]), {})
     peak = analyse(definition).peak_force
     assert judged.peak == pytest.approx(peak, rel=1e-3)  # at 17 + 215 positions
-    assert judged.peak_gradient == pytest.approx([judged.peak / 100.0])  # proportional to the mass
+    slopes = judged.rivals[:, 0]  # of positions with equal forces
+    assert slopes == pytest.approx(np.full(3, judged.peak / 100.0))  # proportional to the mass
     assert judged.violation == pytest.approx(peak / 500.0, rel=1e-3)  # it cannot pull at all
 
 

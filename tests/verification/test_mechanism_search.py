@@ -10,7 +10,7 @@ from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.judgement import Judge, Judgement, is_firm
 from railsim.mechanisms.kinematics import folded, solve
-from railsim.mechanisms.optimisation import _least_breach, optimise
+from railsim.mechanisms.optimisation import FINISH, _least_breach, _rounds, optimise
 from railsim.mechanisms.optimum import Start, best_of
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tables import optimum_sentences, optimum_tables
@@ -101,7 +101,8 @@ def test_gradients_are_those_of_differences_where_parameters_move_the_output(
         (judge(x + step, {}).objective - judge(x - step, {}).objective) / (2.0 * h)
         for step in h * np.eye(3)
     ]
-    assert judge(x, {}).gradient == pytest.approx(found, rel=1e-6)
+    judged = judge(x, {})
+    assert judged.square_gradient + judged.rivals[0] == pytest.approx(found, rel=1e-6)
 
 
 def moving_window(tmp_path, tail):
@@ -369,7 +370,10 @@ def test_the_least_angle_is_that_between_the_positions(tmp_path):
 
 
 def test_a_search_weighs_objective_and_breaches():
-    """(1 - x)^2 + (2 + y)^2 + x at 0; breaches count from 0, ten more where nothing moves."""
+    """(1 - x)^2 + (2 + y)^2 + max(x + 0.5, 3 y - 1) at 0.
+
+    Breaches count from 0, and ten more where nothing moves.
+    """
     slopes, loose = np.zeros((3, 2)), np.zeros(3, dtype=bool)
     for margins, fixed, breach in (
         ([0.2, 0.1, 0.3], loose, 0.0),
@@ -379,12 +383,13 @@ def test_a_search_weighs_objective_and_breaches():
         ([0.2, -0.3, -1e-8], loose | [False, False, True], 0.3),  # kept, but for round-off
     ):
         judged = Judgement(
-            np.array([1.0, 2.0]), np.diag([-1.0, 1.0]), 0.0, np.array([1.0, 0.0]),
+            np.array([1.0, 2.0]), np.diag([-1.0, 1.0]),
+            np.array([-1.0, 0.5]), np.array([[0.0, 3.0], [1.0, 0.0]]),
             np.array(margins), slopes, firm=fixed,
         )  # fmt: skip
         assert judged.violation == pytest.approx(breach)
-        assert judged.objective == pytest.approx(5.0)
-        assert judged.gradient == pytest.approx([-1.0, 4.0])
+        assert judged.objective == pytest.approx(5.5)
+        assert judged.square_gradient + judged.rivals == pytest.approx(np.array([[-1.0, 4.0]]))
     names = ("dead_point", "lift_stroke", "max_stroke", "driver_dead_point", "min_force")
     assert [is_firm(name) for name in names] == [True, True, False, True, False]
 
@@ -394,7 +399,8 @@ def test_least_breach_is_found_where_limits_exclude_each_other_or_one_cannot_be_
 
     def judged(margins, slopes):
         slopes = 3.0 * np.array(slopes)[:, None]
-        return Judgement(np.zeros(1), np.zeros((1, 1)), 0.0, np.zeros(1), np.array(margins), slopes)
+        none = np.zeros(1), np.zeros((1, 1))
+        return Judgement(*none, *none, np.array(margins), slopes)
 
     def both(u):
         x = 3.0 * u[0]
@@ -497,3 +503,31 @@ def test_a_gas_spring_that_does_not_fit_says_by_how_much(tmp_path):
         (f"compressed by {400.0 - least:.1f} mm, 50 mm at most",),
         (f"{least:.1f} to {most:.1f} mm is no range of its lengths",),
     ]
+
+
+def test_largest_amount_is_least_on_a_kink():
+    """Rosen and Suzuki's problem as a minimax one: least on a kink at (0, 1, 2, -1), where f = -44.
+
+    max(f, f + 10 g_1, f + 10 g_2, f + 10 g_3), C. Charalambous, Math. Programming 12 (1977); raised
+    by 100.
+    """
+    center, square = np.array([-5.0, -5.0, -21.0, 7.0]), np.array([1.0, 1.0, 2.0, 1.0])
+    limits = [  # squares, linear parts and numbers of g
+        ([1.0, 1.0, 1.0, 1.0], [1.0, -1.0, 1.0, -1.0], 8.0),
+        ([1.0, 2.0, 1.0, 2.0], [-1.0, 0.0, 0.0, -1.0], 10.0),
+        ([1.0, 1.0, 1.0, 0.0], [2.0, -1.0, 0.0, -1.0], 5.0),
+    ]
+    a = square + 10.0 * np.array([[0.0] * 4, *(np.array(one[0]) for one in limits)])
+    b = center + 10.0 * np.array([[0.0] * 4, *(np.array(one[1]) for one in limits)])
+    c = 100.0 - 10.0 * np.array([0.0, *(one[2] for one in limits)])
+
+    def problem(u):
+        x = 6.0 * u - 3.0
+        none = np.zeros(1), np.zeros((1, 4))
+        amounts, slopes = a @ x**2 + b @ x + c, 6.0 * (2.0 * a * x + b)
+        return Judgement(*none, amounts, slopes, np.ones(1), np.zeros((1, 4)))
+
+    for u in np.random.default_rng(0).uniform(size=(4, 4)):
+        end, found = _rounds(problem, u, problem(u), FINISH)
+        assert 6.0 * end - 3.0 == pytest.approx([0.0, 1.0, 2.0, -1.0], abs=1e-4)
+        assert found.peak == pytest.approx(56.0, abs=1e-7)
