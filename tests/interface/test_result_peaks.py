@@ -1,6 +1,7 @@
 """Peaks and mid-curve values of a result whose arrays are known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from example_result import arrays, attributes, example_result
 from railsim import load_track
 from railsim.notation import QUANTITIES
 from railsim.result import Result, mid_curves, peak, peaks
-from railsim.result.tables import full_curve_table
+from railsim.result.tables import full_curve_table, full_curves_table
 
 
 def small(values, distance=(0.0, 10.0, 20.0), **facts):
@@ -229,7 +230,25 @@ def test_a_vehicle_is_in_the_full_curve_wherever_its_reference_body_stands(offse
     result = Result(arrays, quantities, names, attributes())
     (curve,) = mid_curves(result)
     assert curve.full_curve == pytest.approx(full)
-    assert words in str(full_curve_table(result, curve))
+    table = full_curve_table(result, curve)
+    assert words in str(table)
+    assert [column.heading for column in table.columns][-2:] == ["1", "2"]
+
+
+def test_many_curves_are_a_line_each_with_their_largest_medians():
+    result = small([[[1.0, 2.0]]] * 3)
+    curves = [
+        SimpleNamespace(
+            radius=radius, full_curve=(begin, begin + 50.25), medians={"Q": None},
+            median_peaks=[SimpleNamespace(quantity=QUANTITIES["Q"], value=value)],
+        )
+        for radius, begin, value in ((250.0, 10.0, 61e3), (-300.0, 400.0, 7e4))
+    ]  # fmt: skip
+    table = full_curves_table(result, curves)
+    assert table.texts() == [
+        ["250 m", "10.0 to 60.2", "61.00"],
+        ["-300 m", "400.0 to 450.2", "70.00"],
+    ]
 
 
 def in_the_curve(*courses, **track):

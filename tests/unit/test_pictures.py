@@ -227,7 +227,7 @@ def test_the_traction_is_drawn_forward_up_and_to_the_right():
         # the borders at the ends lie around the first and the last cell
         assert places[[0, -1], 0, 1] + between[[0, -1]] == pytest.approx(2e3 * x[j, [0, -1]])
     (held,) = [c for c in panel.collections if type(c).__name__ == "FillBetweenPolyCollection"
-               or isinstance(c, PolyCollection) and not isinstance(c, Quiver)]  # fmt: skip
+               or (isinstance(c, PolyCollection) and not isinstance(c, Quiver))]  # fmt: skip
     low, high = held.get_paths()[0].vertices.min(axis=0), held.get_paths()[0].vertices.max(axis=0)
     borders = np.asarray(meshes[1].get_coordinates())[:, 0, 1]
     assert [*low, *high] == pytest.approx([-4.0 / 3.0, borders[4], 4.0 / 3.0, borders[8]])

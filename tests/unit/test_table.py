@@ -4,13 +4,16 @@ import csv
 import io
 import json
 import re
+import textwrap
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from railsim.design_checks import Check, check_table
 from railsim.notation import QUANTITIES, REQUESTED, SHOWN_UNITS
-from railsim.table import Amount, Column, Table
+from railsim.table import Amount, Column, Table, _fold
 
 WHEEL = "[red]<b>$x^$\x1b[31m=1+1"
 PEAKS = Table(
@@ -47,6 +50,12 @@ def test_tables_fold_to_the_width_and_lose_nothing(width):
     assert sorted("".join(lines).replace(" ", "")) == sorted("".join(shown).replace(" ", ""))
     if width == 200:
         assert [line.split() for line in lines] == [line.split() for line in shown]
+
+
+@given(st.lists(st.text("abc,", min_size=1, max_size=12), min_size=1), st.integers(12, 60))
+def test_lines_take_as_many_words_as_fit(words, width):
+    text = " ".join(words)
+    assert _fold(text, width) == textwrap.fill(text, width)
 
 
 @pytest.mark.parametrize("width", [30, 40, 60])

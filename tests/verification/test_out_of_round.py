@@ -17,7 +17,8 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.out_of_round import Flat, Harmonics, RadiusTable, Sections
 from railsim.errors import InputError
-from railsim.kernels.wheel_surface import angle_to_flat, surface_height
+from railsim.kernels.wheel_surface import SURFACE_ROW, WAVE, angle_to_flat, surface_height
+from railsim.model.uneven_wheels import PER_LENGTH, PER_WAVE, ROUND
 from railsim.profiles import Profile
 from railsim.simulation import simulate
 
@@ -435,6 +436,17 @@ def test_nodes_and_steps_resolve_the_shortest_wave(order):
         assert surface.wave == pytest.approx(2.0 * np.pi * RADIUS / order, rel=1e-12)
         assert surface.flat == np.inf
         assert len(surface.ahead) >= 8 * order
+
+
+@pytest.mark.parametrize(("wheel", "rail"), [(0.3, 0.5), (0.5, 0.3), (None, 0.3)])
+def test_a_step_is_a_part_of_the_shorter_wave_at_any_speed(wheel, rail):
+    rows = np.zeros((1 if wheel else 0, SURFACE_ROW))
+    rows[:, WAVE] = wheel
+    wheels = ROUND._replace(surface_row=rows)
+    for elastic, parts in ((False, PER_WAVE), (True, PER_LENGTH)):
+        for speed in (0.5, 60.0):
+            found = wheels.longest_step(speed, rail, elastic=elastic)
+            assert found * speed * parts == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize("wheel", ["both", "right"])
