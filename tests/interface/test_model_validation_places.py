@@ -1,5 +1,7 @@
 """A model against a test whose values lie between those of the simulation."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from example_result import OFFSETS
@@ -7,11 +9,12 @@ from made_record import Q0, curve, made, track
 from test_section_values import FORCE, OUT, RIDE, Expected, Tones
 
 import railsim
-from railsim.assessment.model_validation import _same_track
+from railsim.assessment.model_validation import _same_track, matched_results
 from railsim.assessment.sections import TestSection
 from railsim.definitions.measurement import MeasurementFile
+from railsim.errors import InputError
 from railsim.measurement import Measurement
-from railsim.notation import REQUESTED
+from railsim.notation import REQUESTED, SIDES
 from railsim.result import Result
 
 SPEED, RATE = 23.0, 200.0
@@ -262,3 +265,90 @@ def test_every_value_measured_and_simulated_is_that_of_its_filtered_tones(turn):
         near = 3e-5 if key[0].startswith("Y_over_Q") else 3e-3 * scale[key[0][0]]
         for values, wanted in zip(both, expected, strict=True):
             assert values == pytest.approx(wanted[key], rel=4e-3, abs=near), key
+
+
+@pytest.mark.parametrize("dies", [0.0, 700.0])
+def test_sections_in_which_a_channel_rests_are_counted_and_left_out(dies):
+    """One wheel's load rests from `dies` on, the other's does not: that one has all sections."""
+    on = track(*curve(300.0, 900.0), cant=0.12)
+    result = made(
+        on, SPEED, rate=RATE, Q=lambda t, s: np.tile(load(t)[:, None, None], (1, 4, 2)),
+        settings='{"outputs": {"low_pass": {"frequency": 80.0}}, "output_rate": 200.0}',
+    )  # fmt: skip
+    t = np.arange(round(on.length / SPEED * RATE)) / RATE
+    how = MeasurementFile.model_validate({
+        "format": "railsim-measurement/1", "name": "m", "file": ["a.csv"], "rate": RATE,
+        "speed": SPEED, "channels": {f"c{k}": {"quantity": f"Q:1:{SIDES[k]}"} for k in (0, 1)},
+    })  # fmt: skip
+    channels = {"c0": np.where(SPEED * t < dies, load(t), 55e3), "c1": load(t)}
+    found = railsim.validate_model(
+        Measurement(how, t, SPEED * t, np.full(len(t), SPEED), channels), result
+    )
+    places = [pair.place for pair in found["Q_max"].pairs]
+    names = sorted(set(places), key=places.count)
+    every, left = places.count(names[-1]), places.count(names[0]) if len(names) > 1 else 0
+    assert every > 8
+    assert left == 0 if dies == 0.0 else 0 < left < every
+    words = f"m: c0 does not change in {every - left} of {every} sections: a dead sensor?"
+    assert [r for r in found.remarks if r.startswith(words)]
+    assert not [r for r in found.remarks if r.startswith("m: c1 does not change")]
+
+
+def run_of(name, speed, load=None, track=None):
+    made_of = SimpleNamespace(track=track, load=load)
+    part, elsewhere = (SimpleNamespace(speed=np.full(10, x)) for x in (speed, 3.0 * speed))
+    return SimpleNamespace(
+        name=name, definition=made_of, speed=elsewhere.speed,
+        part=lambda begin, end: part if begin == 50.0 < end else elsewhere,
+    )  # fmt: skip
+
+
+class Made(dict):
+    """Arrays of a result and what else a comparison asks of it."""
+
+    def __init__(self, speed, load=None):
+        time = np.array([1.0, 11.0])
+        super().__init__(time=time, distance=50.0 + speed * (time - 1.0))
+        self.load = load
+
+    def vehicle(self):
+        return self
+
+
+def test_a_measured_run_has_the_one_result_at_its_speed_and_in_its_load():
+    results = {
+        "slow": Made(20.0), "fast": Made(40.0), "laden": Made(20.0, "laden"), "other": Made(20.41),
+    }  # fmt: skip
+    runs = [run_of("a", 39.3), run_of("b", 20.4, "laden"), run_of("c", 19.7)]
+    assert matched_results(runs[:2], results) == [results["fast"], results["laden"]]
+    with pytest.raises(InputError) as refused:
+        matched_results([*runs, run_of("d", 10.0), run_of("e", 20.2)], results)
+    none, two = str(refused.value).strip().splitlines()[-2:]
+    wanted = "one on any track at {} m/s in load 'design'"
+    names = "there are slow, fast, laden, other"
+    assert none.strip() == f"d: 0 results; {wanted.format('30.0')}; {names}"
+    assert two.strip() == f"e: 2 results: slow, other; {wanted.format('60.6')}; name the file"
+
+
+@pytest.mark.parametrize("wheelset", [1, 4])
+@pytest.mark.parametrize(("over", "sections"), [(10.9, 8), (10.0, 7)])
+def test_sections_lie_where_channel_and_reference_body_have_both_been(wheelset, over, sections):
+    """A record over 8 sections of 70 m and 10.9 m in a curve; the wheelset is 10.78 m off the body.
+
+    The leading one was nowhere in the first 10.78 m, the trailing one not in the last ones.
+    """
+    on = track(*curve(300.0, 1000.0), cant=0.12)
+    result = made(
+        on, SPEED, rate=RATE, Q=lambda t, s: np.tile(load(t)[:, None, None], (1, 4, 2)),
+        settings='{"outputs": {"low_pass": {"frequency": 80.0}}, "output_rate": 200.0}',
+    )  # fmt: skip
+    first, last = (round(s / SPEED * RATE) for s in (250.0, 250.0 + 8.0 * 70.0 + over))
+    t = np.arange(first, last + 1) / RATE
+    how = MeasurementFile.model_validate({
+        "format": "railsim-measurement/1", "name": "m", "file": ["a.csv"], "rate": RATE,
+        "speed": SPEED, "channels": {"c": {"quantity": f"Q:{wheelset}:left"}},
+    })  # fmt: skip
+    run = Measurement(how, t, SPEED * t, np.full(len(t), SPEED), {"c": load(t)})
+    begins = sorted({pair.begin for pair in railsim.validate_model(run, result)["Q_max"].pairs})
+    begin = SPEED * t[0] + max(0.0, OFFSETS[wheelset - 1])
+    assert begins == pytest.approx(begin + 70.0 * np.arange(sections))
