@@ -649,6 +649,15 @@ def test_wear_of_a_known_wear_number():
     assert figure.get_suptitle().split("\n")[0] == "wagon"
     labels = figure.axes[0].get_legend_handles_labels()[1]
     assert labels == [f"{run}, {3.6 * FAST:.0f} km/h"] * 2
+    # bars of one wheel lie side by side about its tick, those of the next one clear of them
+    bars = [
+        [(bar.get_y(), bar.get_y() + bar.get_height()) for bar in one]
+        for one in figure.axes[0].containers
+    ]
+    for k in range(4):
+        (low, middle), (after, high) = bars[0][k], bars[1][k]
+        assert k - 0.5 < low < middle < after < high < k + 0.5
+        assert low + high == pytest.approx(2.0 * k)
 
 
 def test_rails_without_damage_have_an_axis_from_zero_on():

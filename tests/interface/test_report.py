@@ -43,7 +43,7 @@ from railsim.report.inputs import _settings, inputs_section
 from railsim.report.limits import assess_runs
 from railsim.report.measured import Part, as_section
 from railsim.report.published import published_comparisons, reading
-from railsim.report.runs import _lead, _peaks, page
+from railsim.report.runs import _lead, _peaks, _remarks, page
 from railsim.report.spread import command, spread_rows, worst_rows, worst_runs
 from railsim.result import Hdf5Sink, peaks
 from railsim.result.export import selected
@@ -1006,3 +1006,24 @@ def test_a_report_opens_each_result_once_beside_its_facts(folder, tmp_path, monk
     opened.clear()
     assert main(["report", str(folder), "--out", str(tmp_path / "page.html"), "--quiet"]) == 0
     assert sorted(opened) == sorted(2 * facts) == sorted(2 * ["a.h5", "b.h5", "c.h5"])
+
+
+def test_ends_are_counted_by_their_reason_without_its_numbers_the_most_first():
+    def record(name, status, reason="", *remarks):
+        return {"name": name, "status": status, "status_reason": reason, "remarks": remarks}
+
+    records = [
+        record("a", "failed", "no equilibrium"), record("b", "complete", "", "coarse"),
+        record("c", "derailed", "at 12.5 m"), record("d", "derailed", "at 130 m", "coarse"),
+        record("e", "derailed", "wheel 2 off"),
+    ]  # fmt: skip
+    section = _remarks(records, ["one sentence"])
+    ends, remarks = section.tables
+    assert ends.caption == "4 of 5 runs did not reach the requested end"
+    assert [row[:3] for row in ends.rows] == [
+        ["2", "derailed", "at 12.5 m"], ["1", "failed", "no equilibrium"],
+        ["1", "derailed", "wheel 2 off"],
+    ]  # fmt: skip
+    assert remarks.rows == [["coarse", "b, d"]]
+    assert section.texts == ["one sentence"]
+    assert len(_remarks(records[1:2], []).texts) == 1

@@ -16,6 +16,7 @@ from railsim.assessment.wear import Patches, archard, krause_poll, pearce_sherra
 from railsim.assessment.zones import Assessed
 from railsim.definitions.elements.actuator import Actuator
 from railsim.definitions.elements.friction import CentrePlate, Friction, SideBearer, Wedge
+from railsim.definitions.elements.rows import FrictionLimit
 from railsim.definitions.elements.springs import BumpStop, SpringDamper
 from railsim.definitions.elements.traction import Traction
 from railsim.definitions.excitations.measured import Measured
@@ -457,6 +458,12 @@ AT_THE_BORDER = {
     "a vehicle of 200 wheelsets is one": (
         lambda n: bool(size_faults({"wheelsets": {str(k): {} for k in range(n)}})),
         [(200, False), (201, True)],
+    ),
+    "dry friction of any force is friction": (
+        lambda force: FrictionLimit(force=force).exists, [(0.0, False), (TINY, True)]
+    ),
+    "and of any coefficient": (
+        lambda mu: FrictionLimit(coefficient=mu).exists, [(0.0, False), (TINY, True)]
     ),
     "wear by the work of friction is severe above its transition": (
         severe, [(0.25, False), (above(0.25), True)]

@@ -1,5 +1,6 @@
 """Auxiliary runs of wear loop and recording car: on the track as it is where the vehicle is."""
 
+from collections import namedtuple
 from importlib import import_module
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from railsim.linear.track_response import track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.observation import Assumed, contact
 from railsim.simulation.run_in import _changing_ranges, _way_from_constant
+from railsim.stability import curving
 from railsim.studies import wear_loop
 from railsim.track.alignment import Alignment
 
@@ -179,3 +181,23 @@ def test_support_friction_and_check_rails_change_between_their_unequal_rows():
     assert sorted(map(tuple, found.tolist())) == expected
     plain = railsim.load_track("straight")
     assert _changing_ranges(np.zeros((0, 2)), np.zeros((0, 3)), plain).shape == (0, 2)
+
+
+def test_a_run_into_a_curve_has_its_curvature_cant_and_friction(monkeypatch):
+    """Of rails whose friction differs, in proportion to the one that is looked for."""
+    asked = []
+
+    def settle(model, track, speed, *to):
+        asked.append((speed, *to[:3]))
+        return railsim.load_track("straight")
+
+    monkeypatch.setattr(curving, "curve_to_settle_in", settle)
+    monkeypatch.setattr(curving._Search, "_advance", lambda *_: None)
+    search = object.__new__(curving._Search)
+    search.model = search.track = None
+    search.shares = np.array([0.5, 1.5])
+    straight = namedtuple("System", "track")(None)
+    goal = np.array([1.0 / 300.0, 0.12, 400.0, 0.3])
+    state = search._into(goal, 20.0, straight, np.arange(6.0), 1e-3)
+    assert asked == [(20.0, 1.0 / 300.0, 0.12, (pytest.approx(0.15), pytest.approx(0.45)))]
+    assert state.tolist() == [0.0, 1.0, 2.0, 0.0, 0.0, 20.0]

@@ -301,6 +301,22 @@ def test_contact_in_the_mean_of_a_run_with_linear_contact_is_that_contact(monkey
     assert max(y.max(), yaw.max()) < 1e-6
 
 
+def test_what_is_seen_does_not_depend_on_the_size_of_the_irregularities():
+    """A share of the assumed power is left, of 1e-12 m3 as of 1 m3; of no power nothing is seen."""
+    bins = 257  # of 512 points
+    share = np.linspace(0.0, 1.0, bins)
+    grid = STEP * np.arange(300)
+    piece = Piece(grid, np.zeros((1, 300)), np.ones((1, 300), bool), np.full(300, 21.0), 500.0)
+    forces = ("Q.1.left",), np.zeros((bins, 1, 4), dtype=complex), np.zeros((1, 300))
+    for size in (1e-12, 1.0):
+        covariance = np.zeros((bins, 4, 4), dtype=complex)
+        covariance[:, range(3), range(3)] = size * share[:, None]
+        power = np.tile([size, size, size, 0.0], (bins, 1))
+        found = estimate_of(piece, np.zeros((4, bins), complex), covariance, power, forces)
+        assert found.seen[:3] == pytest.approx(np.tile(1.0 - share, (3, 1)))
+        assert not found.seen[3].any()
+
+
 def test_estimate_of_a_piece_adds_up_its_fields_and_leaves_out_what_is_not_seen():
     """Fields with more than half of their power left are not shown; forces are H times the mean."""
     random = np.random.default_rng(8)
