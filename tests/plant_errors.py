@@ -36,6 +36,8 @@ SWAPPED = {
 }  # fmt: skip
 FACTORS = tokenize.NAME, tokenize.NUMBER, tokenize.STRING  # beside brackets
 SECONDS_PER_ERROR = 2400
+NEAREST = 5  # files for a constant
+SCHEMA = "tests/unit/test_definitions_schema.py"  # knows the bounds of every definition
 
 
 @dataclass(frozen=True)
@@ -116,13 +118,15 @@ def tests_of(path: str, count: int) -> list[str]:
     best = sorted(scores, key=lambda name: -scores[name])
     # what runs in the loop is named nowhere: the physics of the whole sees it
     physics = [name for name in best if "/verification/" in name] if room == "kernels" else []
-    return list(dict.fromkeys([*best[:count], *physics[:count]]))
+    schema = [SCHEMA] if "railsim/definitions/" in path else []
+    return list(dict.fromkeys([*schema, *best[:count], *physics[:count]]))
 
 
 def tests_at(planted: Planted, data: Any, most: int) -> list[str]:
-    """Tests that execute a line of the changed statement, of a constant any line of its module.
+    """Tests that execute a line of the changed statement.
 
-    `data`: CoverageData; `most` of them: half nearest by their files, half at random.
+    Of a constant: the nearest files, which may name it alone, and tests that execute any line of
+    its module.  `data`: CoverageData; `most` tests: half nearest by their files, half at random.
     """
     path = ROOT / planted.path
     statements = [
@@ -137,15 +141,17 @@ def tests_at(planted: Planted, data: Any, most: int) -> list[str]:
     (measured,) = [file for file in data.measured_files() if file.endswith(f"/{planted.path}")]
     by_line = data.contexts_by_lineno(measured)
     found = {name for line in lines for name in by_line.get(line, ()) if name}
-    found = found or {name for names in by_line.values() for name in names if name}
-    near = tests_of(planted.path, 8)
+    near, files = tests_of(planted.path, 8), []
+    if not found:
+        found = {name for names in by_line.values() for name in names if name}
+        files = near[:NEAREST]
     rank = {file: k for k, file in enumerate(near)}
     tests = sorted({name.split("|")[0] for name in found})
     tests.sort(key=lambda name: rank.get(name.split("::")[0], len(near)))
     if len(tests) > most:
         rest = random.Random(1).sample(tests[most // 2 :], most - most // 2)
         tests = [*tests[: most // 2], *rest]
-    return tests
+    return [*files, *(name for name in tests if name.split("::")[0] not in files)]
 
 
 def first_failure(planted: Planted, tests: list[str]) -> str:

@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,7 @@ from PIL import Image
 from railsim import cli
 from railsim.contact import contact_geometry
 from railsim.contact.gauges import gauge_table, wheel_gauge
-from railsim.contact.summary import ContactSummary, Pair
+from railsim.contact.summary import PATCH_SHARES, ContactSummary, Pair
 from railsim.contact.tables import (
     conicity_map_table,
     conicity_table,
@@ -442,3 +443,10 @@ def test_some_lines_of_the_contact_functions_are_printed():
         functions = {name: y for name in NAMES}
         lines = printed_functions(SimpleNamespace(functions=functions))["lateral"]
         assert lines == pytest.approx(np.linspace(-0.01, 0.01, printed).tolist())
+
+
+def test_patches_are_shown_at_displacements_that_rise():
+    """To both sides, in the middle, and most of them towards the flange of the right wheel."""
+    assert all(one < two for one, two in pairwise(PATCH_SHARES))
+    assert 0.0 in PATCH_SHARES
+    assert -1.0 < PATCH_SHARES[0] < 0.0 < -PATCH_SHARES[0] < PATCH_SHARES[-1] < 1.0
