@@ -74,6 +74,8 @@ def test_a_contact_force_is_told_with_its_senses_and_rests(monkeypatch):
         "contact force at 0.35000 MPa: least 70.00 N, most no value",
         "rests nowhere within the travel without contact",
     ]
+    silent = Made(**vars(plain) | {"reason": "why"})
+    assert said(monkeypatch, loaded=False, contact=silent)[1:] == ["why"]
     rests = Rest(0.5, 0.4, 0.6, True), Rest(0.8, 0.8, 0.8, False)
     rough = Made(pressure=0.35e6, force=both, rising={"a": 80.0}, falling={"a": 60.0},
                     reason="why", rests=rests)  # fmt: skip

@@ -1,0 +1,220 @@
+"""Pictures of mechanisms: plain numbers in the units of their axes."""
+
+from types import SimpleNamespace as Made
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgba
+
+from railsim.definitions.mechanism.parts import AirSpring, Cam
+from railsim.plot import mechanisms as plots
+from railsim.plot.style import LIMIT
+
+S = np.radians([10.0, 20.0, 30.0, 40.0])  # of the driver
+HEIGHT = np.array([0.0, 0.1, 0.3, 0.6])  # m
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    yield
+    plt.close("all")
+
+
+def made(output=(), *, axis=1, angle=0.0, **given):
+    """Results of a mechanism driven by an angle, or, without one, by a length."""
+    of = {
+        "driver": Made(angle=angle), "angles": {}, "solve": None, "unknown": "cylinder",
+        "output": Made(point="pan"), "optimise": None, "held_by": None, "joints": {},
+    } | given.pop("definition", {})  # fmt: skip
+    plain = {"zone": {}, "contact": None, "timed": None, "transitions": ()} | given
+    model = plain.pop("model", Made(axis=axis))
+    return Made(output={"travel": S, "height": HEIGHT, **dict(output)},
+                definition=Made(**of), model=model, **plain)  # fmt: skip
+
+
+def zone_of(name, low, work, high):
+    return {where: {name: x} for where, x in (("low", low), ("work", work), ("high", high))}
+
+
+def long(axes):
+    """Curves of more than two points by their label."""
+    return {line.get_label(): line.get_xydata() for line in axes.lines if len(line.get_xdata()) > 2}
+
+
+def over(x, *values):
+    return [pytest.approx(np.stack((x, y), axis=1)) for y in values]
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.1, 0.5), (0.5, 0.1)])
+def test_a_zone_is_shaded_between_its_ends_with_the_work_height(low, high):
+    axes = plt.figure().subplots()
+    plots.mark_zone(axes, made(zone=zone_of("height", low, 0.2, high)), "height")
+    assert axes.patches[0].get_extents().transformed(axes.transData.inverted()).intervalx == (
+        pytest.approx((100.0, 500.0))
+    )
+    assert axes.lines[0].get_xdata()[0] == pytest.approx(200.0)
+    bare = plt.figure().subplots()
+    plots.mark_zone(bare, made(zone=zone_of("height", low, 0.2, high)), "length")
+    plots.mark_zone(bare, made(), "height")
+    assert not bare.patches
+    assert not bare.lines
+
+
+def test_a_path_is_drawn_in_millimetres():
+    x = np.array([0.0, 0.01, 0.02, 0.01])
+    zone = {"low": {"x": 0.005, "height": 0.05}}
+    (axes,) = plots.path_figure(made({"x": x}, zone=zone)).axes
+    path, point = (line.get_xydata() for line in axes.lines)
+    assert [path] == over(1e3 * x, 1e3 * HEIGHT)
+    assert point == pytest.approx(np.array([[5.0, 50.0]]))
+    assert {text.get_text(): text.xy for text in axes.texts} == {"low": pytest.approx((5.0, 50.0))}
+
+
+def test_transmission_angles_are_folded_and_have_their_limit():
+    """An angle of 130 degrees between two lines is one of 50; a limit of 40 is named."""
+    angles = {"one": Made(limited=True), "two": Made(limited=False)}
+    output = {"one": np.radians([130.0, 50.0, 90.0, -30.0]), "two": S,
+              "cam_pressure_angle": np.radians([5.0, -5.0, 1.0, 2.0])}  # fmt: skip
+    limits = Made(min_transmission_angle="a")
+    result = made(output, definition={"angles": angles, "optimise": limits},
+                  model=Made(axis=1, number=lambda _: np.radians(40.0)))  # fmt: skip
+    (axes,) = plots.angles_figure(result).axes
+    found, degrees = long(axes), np.degrees(S)
+    assert [found["one"]] == over(degrees, [50.0, 50.0, 90.0, 30.0])
+    assert [found["two"]] == over(degrees, degrees)
+    assert [found["cam pressure angle"]] == over(degrees, [5.0, -5.0, 1.0, 2.0])
+    (limit,) = [line for line in axes.lines if len(line.get_xdata()) == 2]
+    assert limit.get_ydata() == pytest.approx([40.0, 40.0])
+    assert to_rgba(limit.get_color()) == to_rgba(LIMIT)
+    assert [text.get_text() for text in axes.texts] == ["limit of one"]
+    for no_limit in (None, Made(min_transmission_angle=None)):
+        bare = made(output, definition={"angles": angles, "optimise": no_limit})
+        assert len(plots.angles_figure(bare).axes[0].lines) == 3
+
+
+def test_pressures_are_in_megapascals_over_the_height_or_the_length():
+    pressure, back = 1e6 * np.array([0.1, 0.2, 0.3, 0.2]), 1e6 * np.array([0.2, 0.3, 0.4, 0.3])
+    output = {"pressure": pressure, "pressure_back": back, "length": 1.0 + HEIGHT}
+    (axes,) = plots.pressure_figure(made(output, contact=Made(pressure=0.35e6))).axes
+    found = long(axes)
+    wanted = over(1e3 * HEIGHT, 1e-6 * pressure, 1e-6 * back, np.full(4, 0.35))
+    assert [found[name] for name in ("needed", "needed on the way back", "held")] == wanted
+    assert axes.get_ylim()[0] == 0.0
+    del output["pressure_back"]
+    (axes,) = plots.pressure_figure(made(output, definition={"output": None})).axes
+    assert [long(axes)["needed"]] == over(1e3 * (1.0 + HEIGHT), 1e-6 * pressure)
+    assert len(axes.lines) == 1
+
+
+def test_a_contact_force_is_drawn_with_both_senses_and_its_rests():
+    """Filled where the output comes back to its height, open where it does not."""
+    curve = np.array([70.0, 71.0, 69.0, 70.0])
+    contact = Made(curve=curve, pressure=0.35e6, bounds=(curve + 5.0, curve - 5.0),
+                   rising={"low": 1.0}, falling={"low": 2.0},
+                   equilibria=((0.2, True), (0.4, False)))  # fmt: skip
+    (axes,) = plots.contact_figure(made(contact=contact)).axes
+    assert [*long(axes)] == ["at 0.3500 MPa", "rising", "falling"]
+    assert [*long(axes).values()] == over(1e3 * HEIGHT, curve, curve + 5.0, curve - 5.0)
+    *_, stable, open_ = axes.lines
+    assert np.ravel([stable.get_xydata(), open_.get_xydata()]) == pytest.approx([200, 0, 400, 0])
+    assert (stable.get_mfc(), open_.get_mfc()) == ("k", "w")
+    contact.falling = contact.rising
+    assert [*long(plots.contact_figure(made(contact=contact)).axes[0])] == ["at 0.3500 MPa"]
+
+
+def test_a_carpet_has_a_line_for_each_pressure_and_the_load(monkeypatch):
+    heights, pressures = np.array([0.2, 0.25, 0.3]), 1e6 * np.array([0.3, 0.45])
+    forces = 1e3 * np.array([[10.0, 20.0], [11.0, 21.0], [12.0, 23.0]])
+    table = Made(heights=heights, pressures=pressures, forces=forces)
+    monkeypatch.setattr(plots, "table_of", lambda *_: table)
+    length, load = 0.2 + 0.1 * HEIGHT, 1e3 * np.array([12.0, 13.0, 15.0, 14.0])
+    result = made({"length": length, "force": load}, motion=None,
+                  definition={"held_by": AirSpring.model_construct()})  # fmt: skip
+    (axes,) = plots.carpet_figure(result).axes
+    first, second, drawn = (line.get_xydata() for line in axes.lines)
+    assert [first, second] == over([200.0, 250.0, 300.0], [10, 11, 12], [20, 21, 23])
+    assert [drawn] == over(1e3 * length, load / 1e3)
+    assert axes.lines[-1].get_label() == "load"
+    texts = {text.get_text(): text.xy for text in axes.texts}
+    assert texts == {
+        "0.3 MPa": pytest.approx((200.0, 10.0)), "0.45 MPa": pytest.approx((200.0, 20.0)),
+    }  # fmt: skip
+    assert axes.get_xlim()[0] < 200.0
+
+
+def test_gas_springs_have_their_length_in_millimetres_and_their_push():
+    output = {"a_length": 0.3 + HEIGHT, "a_force": 500.0 + S, "b_length": 0.5 - HEIGHT / 2.0,
+              "b_force": 300.0 - S}  # fmt: skip
+    length, push = plots.gas_spring_figure(made(output)).axes
+    degrees = np.degrees(S)
+    assert [*long(length).values()] == over(degrees, 300.0 + 1e3 * HEIGHT, 500.0 - 500.0 * HEIGHT)
+    assert [*long(push).values()] == over(degrees, 500.0 + S, 300.0 - S)
+    assert [*long(push)] == ["a", "b"]
+
+
+@pytest.mark.parametrize("unit", ["N", "N m"])
+def test_motion_in_time_has_speed_and_acceleration_of_the_output(monkeypatch, unit):
+    """Components and absolute value: of 3 and -4 it is 5."""
+    monkeypatch.setattr(plots, "driving_actuator", lambda _: "motor")
+    monkeypatch.setattr(plots, "force_unit", lambda *_: unit)
+    time = np.array([0.0, 0.5, 1.0])
+    speed = np.array([[0.3, -0.4], [0.6, 0.8], [0.0, 1.0]])
+    point = (speed, 2.0 * speed)
+    timed = Made(time=time, motion=Made(s=S[:3]), force=np.array([5.0, 6.0, 7.0]),
+                 point=lambda name: point if name == "pan" else None)  # fmt: skip
+    driver, force, first, second = plots.time_figure(made(timed=timed)).axes
+    assert [line.get_xydata() for line in driver.lines] == over(time, np.degrees(S[:3]))
+    assert [line.get_xydata() for line in force.lines] == over(time, timed.force)
+    assert force.get_ylabel() == ("torque" if unit == "N m" else "force") + f" of 'motor' ({unit})"
+    absolute = np.array([500.0, 1000.0, 1000.0])
+    for axes, times in ((first, 1.0), (second, 2.0)):
+        assert [*long(axes)] == ["x", "y", "absolute"]
+        assert [*long(axes).values()] == over(
+            time, *(times * values for values in (*(1e3 * speed.T), absolute))
+        )
+    alone = plots.time_figure(made(timed=timed, definition={"output": None})).axes
+    assert [len(axes.lines) for axes in alone] == [1, 1, 0, 0]
+
+
+def test_cases_have_a_line_each():
+    one, two = (made({"force": np.arange(4.0) * k}) for k in (1.0, 2.0))
+    (axes,) = plots.cases_figure({"empty": one, "laden": two}).axes
+    found = long(axes)
+    assert [*found] == ["empty", "laden"]
+    assert [*found.values()] == over(np.degrees(S), np.arange(4.0), 2.0 * np.arange(4.0))
+
+
+@pytest.mark.parametrize("angle", [0.0, None])
+def test_the_rate_on_a_cam_is_drawn_arc_by_arc_and_beyond(monkeypatch, angle):
+    """A roller's body that turns by 0.5, then by 0.25 of the driver: rates of 2 and 4."""
+    arcs = [Made(turns="left"), Made(turns="right")]
+    cam = Cam.model_construct(cam="rocker.roller", arcs=arcs)
+    q1 = np.zeros((4, 3, 3))
+    q1[:, 1, 2] = [0.5, -0.5, 0.25, 0.25]
+    motion = Made(q1=q1, arcs=np.array([[7], [7], [8], [8]]))
+    asked = []
+
+    def alone(given, row, arc, beyond):
+        asked.append((given is motion, row, arc, beyond))
+        return None if arc == 8 else Made(s=S[:3], q1=np.full((3, 3, 3), -0.2))
+
+    monkeypatch.setattr(plots, "cam_rows", lambda _: {"cam": 0})
+    monkeypatch.setattr(plots, "roller_body", lambda *_: 1)
+    monkeypatch.setattr(plots, "on_one_arc", alone)
+    linkage = Made(joint=np.array([[0, 0, 0, 0, 7, 2]]))
+    result = made(
+        motion=motion, angle=angle, model=Made(axis=1, linkage=linkage), travel=-0.5,
+        definition={"joints": {"cam": cam}}, transitions=(Made(travel=S[1]),),
+    )  # fmt: skip
+    (axes,) = plots.cam_figure(result).axes
+    scale = 1e3 if angle is None else 180.0 / np.pi
+    first, beyond, second, at = axes.lines[:4]
+    assert (first.get_label(), second.get_label()) == ("arc 1, turns left", "arc 2, turns right")
+    assert [first.get_xydata()] == over(scale * S[:2], [2.0, 2.0])
+    assert [second.get_xydata()] == over(scale * S[2:], [4.0, 4.0])
+    assert [beyond.get_xydata()] == over(scale * S[:3], [5.0, 5.0, 5.0])
+    assert at.get_xdata()[0] == pytest.approx(scale * S[1])
+    assert asked == [(True, 0, 7, pytest.approx(0.06)), (True, 0, 8, pytest.approx(0.06))]
+    (text,) = axes.texts
+    assert text.get_text() == ("20.00°" if angle is not None else "349.07 mm")
