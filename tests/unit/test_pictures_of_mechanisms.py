@@ -1,5 +1,6 @@
 """Pictures of mechanisms: plain numbers in the units of their axes."""
 
+from collections import namedtuple
 from types import SimpleNamespace as Made
 
 import matplotlib.pyplot as plt
@@ -8,6 +9,8 @@ import pytest
 from matplotlib.colors import to_rgba
 
 from railsim.definitions.mechanism.parts import AirSpring, Cam
+from railsim.errors import InputError
+from railsim.mechanisms import cams, drawing
 from railsim.plot import mechanisms as plots
 from railsim.plot.style import LIMIT
 
@@ -218,3 +221,63 @@ def test_the_rate_on_a_cam_is_drawn_arc_by_arc_and_beyond(monkeypatch, angle):
     assert asked == [(True, 0, 7, pytest.approx(0.06)), (True, 0, 8, pytest.approx(0.06))]
     (text,) = axes.texts
     assert text.get_text() == ("20.00°" if angle is not None else "349.07 mm")
+
+
+def test_a_cam_is_drawn_from_the_begin_to_the_end_of_its_arcs():
+    """A quarter to the left, then three quarters to the right, then a circle without ends."""
+    ends = np.array([[1, 0, 0, 1, 1], [1, 0, 0, 1, -1], [0, 0, 0, 0, 1]], dtype=float)
+    linkage = Made(
+        joint=np.array([[9, 9, 9, 9, 9, 9], [0, 0, 0, 0, 0, 3]]), arc_ends=ends,
+        arc_radius=np.array([[0.5, 0.25, 2.0]]), arc_point=np.array([0, 1, 1]),
+        point=np.array([[[1.0, 2.0], [3.0, 4.0]]]), point_body=np.array([0, 5]),
+    )  # fmt: skip
+    moved = {0: 0.0, 5: 10.0}  # how far the bodies lie to the right
+
+    def at(body, x, y):
+        return np.array([[x + moved[body], y]]), None
+
+    motion = Made(model=Made(linkage=linkage), at=at)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(drawing, "cam_rows", lambda _: {"cam": 1})
+        line = drawing._cam(motion, "cam")
+    assert (line.kind, line.name) == ("cam", "cam")
+    (outline,) = line.xy
+    for k, (centre, radius, turn) in enumerate(
+        [((1.0, 2.0), 0.5, 0.5 * np.pi), ((13.0, 4.0), 0.25, -1.5 * np.pi),
+         ((13.0, 4.0), 2.0, 2.0 * np.pi)]
+    ):  # fmt: skip
+        x, y = (outline[k * drawing.ARC_POINTS : (k + 1) * drawing.ARC_POINTS] - centre).T
+        assert np.hypot(x, y) == pytest.approx(radius)
+        turned = np.unwrap(np.arctan2(y, x))
+        assert turned[-1] - turned[0] == pytest.approx(turn)
+        assert np.diff(turned) == pytest.approx(turn / (drawing.ARC_POINTS - 1))
+        assert (x[0], y[0]) == pytest.approx((radius, 0.0))
+
+
+@pytest.mark.parametrize("start", [0.0, 2.0])
+def test_a_roller_is_kept_on_its_arc_a_bit_beyond_its_ends(monkeypatch, start):
+    """From 0.6 to 0.9 of the driver, 0.2 beyond both ends but not beyond the mechanism's."""
+    Linkage = namedtuple("Linkage", "joint arc_ends")
+    joint = np.arange(12).reshape(2, 6)
+    model = Made(linkage=Linkage(joint, np.ones((4, 5))), start=start, end=2.0 - start)
+    s = np.array([0.3, 0.6, 0.9, 1.5])
+    motion = Made(model=model, arcs=np.array([[0, 2], [0, 3], [0, 3], [0, 2]]), s=s,
+                  q=np.arange(4.0)[:, None], known={"x": 1})  # fmt: skip
+    monkeypatch.setattr(cams, "replace", lambda one, **given: Made(**vars(one) | given))
+    solved = []
+    monkeypatch.setattr(cams, "solve", lambda *given: solved.append(given) or "found")
+    assert cams.on_one_arc(motion, 1, 3, 0.2) == "found"
+    free, places, first = solved[0]
+    assert free.linkage.joint.tolist() == [[0, 1, 2, 3, 4, 5], [6, 7, 8, 9, 3, 1]]
+    assert free.linkage.arc_ends.tolist() == [[1.0] * 5] * 3 + [[0.0] * 4 + [1.0]]
+    assert (places[0], places[-1], len(places)) == (pytest.approx(0.4), pytest.approx(1.1), 101)
+    assert (first.s, first.q, first.arcs.tolist(), first.known) == (0.6, 1.0, [[0, 3]], {})
+    assert (joint == np.arange(12).reshape(2, 6)).all()
+    cams.on_one_arc(motion, 1, 3, 5.0)
+    assert (solved[1][1][0], solved[1][1][-1]) == (0.0, 2.0)
+
+    def impossible(*_):
+        raise InputError([])
+
+    monkeypatch.setattr(cams, "solve", impossible)
+    assert cams.on_one_arc(motion, 1, 3, 0.2) is None

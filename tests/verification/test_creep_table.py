@@ -1,6 +1,7 @@
 """Table of the full theory: interpolation, limits, smoothness, the solver behind it."""
 
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from railsim.contact.creep_table import (
     table_of_nodes,
     write_nodes,
 )
-from railsim.contact.exact_creep import exact_creep_force
+from railsim.contact.exact_creep import exact_creep_force, rolling_grid
 from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels import creep_table as kernel
 from railsim.kernels.creep_table import N_PSI, N_RATIO, N_T, N_THETA, T_HALF
@@ -129,6 +130,34 @@ def test_shipped_nodes_are_what_the_generator_makes(monkeypatch, i_ratio, i_thet
     # stored with five digits
     shipped = shipped_nodes().force[i_ratio, i_theta, :, :: N_T // 2]
     np.testing.assert_allclose(shipped, row, atol=6e-6)
+
+
+@pytest.mark.parametrize(("i_theta", "component"), [(0, 0), (2, 1)])
+@pytest.mark.parametrize("ratio", [0.9, 1.1])
+def test_nodes_on_coarse_grids_are_near_a_cubic(monkeypatch, i_theta, component, ratio):
+    """Pure longitudinal or lateral creepage: 1 - (1 - q/3)^3 to 5 % (Vermeulen and Johnson, 1964).
+
+    Over t = q/(q + 2), 2 times the linear force at its begin; full sliding at its end.
+    """
+    grids = [rolling_grid(ratio, POISSON, n, n) for n in (8, 4)]
+    module = import_module(MODULE)
+    monkeypatch.setattr(module, "_grids", lambda _: grids)
+    monkeypatch.setattr(module, "linear_coefficients", linear_coefficients.__wrapped__)
+    for name, count in (("N_T", 4), ("N_PSI", 2), ("N_THETA", 2)):
+        monkeypatch.setattr(module, name, count)
+    row, failures = node_row(ratio, i_theta)
+    assert failures == 0
+    assert row.shape == (2, 5, 3)
+    t = np.arange(1, 5) / 4.0
+    q = np.minimum(2.0 * t / np.maximum(1.0 - t, 1e-9), 3.0)
+    expected = np.append(2.0, (1.0 - (1.0 - q / 3.0) ** 3) / t)
+    assert row[0, :, component] == pytest.approx(expected, rel=0.05)
+    assert row[0, [0, -1], component] == pytest.approx([2.0, 1.0], rel=1e-3)
+    if i_theta == 0:
+        assert (row[1] == row[0]).all()
+    else:  # pure spin: no force along the rail, a moment
+        assert abs(row[1, :, 0]).max() < 1e-9
+        assert (row[1, :, 2] > 0.05).all()
 
 
 @pytest.mark.parametrize("workers", [1, 2])
