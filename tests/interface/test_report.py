@@ -27,6 +27,7 @@ from railsim.compare import differing, flat_keys
 from railsim.definitions import Settings
 from railsim.definitions.units_of_keys import unit_of_input, unit_of_key
 from railsim.definitions.vehicle.laws import Signal
+from railsim.report import drawings
 from railsim.report.curves import (
     CELLS,
     MISSING,
@@ -1027,3 +1028,19 @@ def test_ends_are_counted_by_their_reason_without_its_numbers_the_most_first():
     assert remarks.rows == [["coarse", "b, d"]]
     assert section.texts == ["one sentence"]
     assert len(_remarks(records[1:2], []).texts) == 1
+
+
+@pytest.mark.parametrize("y", [0.0, 0.1])
+def test_a_wheelset_seen_from_above_is_its_axle_and_two_wheels(y):
+    """From the side a circle; the left wheel is at negative y."""
+    wheelset = SimpleNamespace(radius=(0.46, 0.42), tape_circle_distance=1.5)
+    body = SimpleNamespace(wheelset=wheelset, position=(9.0, y, -0.46), name="a<b")
+    found = [
+        re.findall(r"[-.\d]+,[-.\d]+", text) for text in drawings._wheelset(body, drawings.TOP)
+    ]
+    axle, left, right = (np.array([one.split(",") for one in line], float) for line in found)
+    assert axle == pytest.approx(np.array([[9.0, y - 0.75], [9.0, y + 0.75]]))
+    assert left == pytest.approx(np.array([[8.54, y - 0.75], [9.46, y - 0.75]]))
+    assert right == pytest.approx(np.array([[8.58, y + 0.75], [9.42, y + 0.75]]))
+    (circle,) = drawings._wheelset(body, drawings.SIDE)
+    assert 'cx="9.000" cy="-0.460" r="0.420"><title>a&lt;b</title>' in circle

@@ -9,6 +9,7 @@ import pytest
 import railsim
 from railsim import cli
 from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.settings import InitialState as Initial
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.model.assembly import without_rails
@@ -538,3 +539,54 @@ def test_wheelset_of_another_gauge_is_remarked_on(gauge, backs, usual):
     assert bool(remarks) != usual
     said = f"{1e3 * (gauge - backs):.4g} mm less than the gauge"
     assert all(said in str(remark) and "and 1 more" in str(remark) for remark in remarks)
+
+
+def springs_of(slope=0.0):
+    """Loads of two wheels that stand 0.75 m to either side on springs of 1e12 N/m^1.5."""
+
+    def loads_of(state):
+        y, z, roll = state[3:6]
+        deep = np.array([z - 0.75 * roll - slope * y, z + 0.75 * roll + slope * y])
+        return None if deep.max() > 1e-3 else np.array([1e12 * np.maximum(deep, 0.0) ** 1.5])
+
+    return loads_of
+
+
+TARGET = np.array([50e3, 70e3])
+DEEP = (TARGET / 1e12) ** (2.0 / 3.0)  # m
+
+
+@pytest.mark.parametrize(("z", "roll"), [(1e-5, 0.0), (-2e-4, 0.0), (0.0, 3e-4), (0.0, -3e-4)])
+def test_height_and_roll_are_found_also_from_the_air(z, roll):
+    trial = np.array([9.0, 9.0, 9.0, 0.0, z, roll])
+    assert disturbance._make_carry(springs_of(), 0, 2, TARGET, trial)
+    assert trial[4] == pytest.approx(DEEP.mean(), rel=1e-3)
+    assert trial[5] == pytest.approx((DEEP[1] - DEEP[0]) / 1.5, rel=1e-2)
+    assert trial[:4].tolist() == [9.0, 9.0, 9.0, 0.0]
+
+
+def test_contacts_that_cannot_be_computed_move_nothing():
+    for z in (2e-3, 1e-3 - 1e-8):  # beyond the springs, and beyond them a tenth of a micrometre on
+        trial = np.array([0.0, 0.0, 0.0, 0.0, z, 0.0])
+        assert not disturbance._make_carry(springs_of(), 0, 2, TARGET, trial)
+        assert trial.tolist() == [0.0, 0.0, 0.0, 0.0, z, 0.0]
+
+
+@pytest.mark.parametrize("y", [0.006, -0.006])
+def test_a_wheelset_follows_slopes_to_where_it_is_moved(y):
+    """Treads of 1 in 20: it rolls by 6 mm/20/0.75 m the other way, from where it stood before."""
+    slope = 0.05
+    model = SimpleNamespace(index=SimpleNamespace(wheelsets=["axle"], coordinate=lambda *_: 2))
+    state = np.zeros(8)
+    state[3] = y
+    state[4], state[5] = DEEP.mean(), (DEEP[1] - DEEP[0]) / 1.5
+    loads_of = springs_of(slope=slope)
+    state_before = state.copy()
+    disturbance._follow_contacts(model, loads_of, 0, Initial(y=y), TARGET, state)
+    assert loads_of(state)[0] == pytest.approx(TARGET, rel=1e-3)
+    assert state[5] - state_before[5] == pytest.approx(-slope * y / 0.75, rel=1e-2)
+    assert state[3] == y
+    away = np.zeros(8)
+    away[4] = 5e-3
+    disturbance._follow_contacts(model, loads_of, 0, Initial(y=0.0), TARGET, away)
+    assert away[4] == 5e-3

@@ -153,6 +153,9 @@ def test_nodes_on_coarse_grids_are_near_a_cubic(monkeypatch, i_theta, component,
     expected = np.append(2.0, (1.0 - (1.0 - q / 3.0) ** 3) / t)
     assert row[0, :, component] == pytest.approx(expected, rel=0.05)
     assert row[0, [0, -1], component] == pytest.approx([2.0, 1.0], rel=1e-3)
+    # lateral force by spin and moment by lateral creepage begin with the sign that they go on with
+    begins = np.abs(row[:, 0]) > 1e-6
+    assert (np.sign(row[:, 0]) == np.sign(row[:, 1]))[begins].all()
     if i_theta == 0:
         assert (row[1] == row[0]).all()
     else:  # pure spin: no force along the rail, a moment
