@@ -5,12 +5,20 @@ Sections and results of the program CONTACT (tests/data/sections, licence beside
 
 import csv
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from railsim.contact import out_of_round
 from railsim.contact.curves import RailCurve, rail_curve
-from railsim.contact.out_of_round import ACROSS, rolled_out, surface_arrays, wheel_surface
+from railsim.contact.out_of_round import (
+    ACROSS,
+    _deviation,
+    rolled_out,
+    surface_arrays,
+    wheel_surface,
+)
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_vehicle
 from railsim.definitions.settings import Settings
@@ -494,3 +502,52 @@ def test_arms_begin_as_the_wheels_stand():
     result = simulate(coach, load_track("straight"), speed=20.0, duration=0.6, settings=settings)
     change, begins = np.abs(result["dQ_over_Q0"]), result["time"] < 0.1
     assert change[begins].max() < change[~begins].max()
+
+
+def flattened(angles, depths):
+    """Sections of three points, lower than a round wheel by depths, twice as much in the middle."""
+    base = np.array([1e-3, 0.0, 2e-3])
+    change = -np.outer(depths, [1.0, 2.0, 0.0])
+    return SimpleNamespace(angles=angles, heights=base + change), change
+
+
+@pytest.mark.parametrize("scatter", [False, True])
+def test_a_flat_reaches_to_the_sections_beside_those_that_are_deep(scatter):
+    """All around, each 0.1745 rad, 0.2 mm at 10 to 12; some 30 um elsewhere are none of it.
+
+    Of scatter, what is deeper than a tenth of the deepest counts, within half a radian of it.
+    """
+    angles, depths = np.radians(10.0 * np.arange(36)), np.zeros(36)
+    depths[10:13] = 1e-4, 2e-4, 1.5e-4
+    if scatter:
+        depths[[3, 25]] = 1.5e-5, 1.6e-5
+        depths[20] = 3e-5  # more than a tenth, 1.6 rad off
+    part, change = flattened(angles, depths)
+    found, begin, end = _deviation(part)
+    assert found == pytest.approx(change)
+    assert (begin, end) == pytest.approx(np.radians([90.0, 130.0]))
+
+
+def test_sections_without_a_flat_are_looked_at_from_the_first_to_the_last():
+    """None is off by 20 um; of sections of a part the round wheel is between the ends."""
+    angles = np.linspace(1.0, 1.5, 11)
+    part, change = flattened(angles, np.full(11, 0.99e-5))
+    found, begin, end = _deviation(part)
+    assert found == pytest.approx(0.0 * change, abs=1e-12)
+    assert (begin, end) == (1.0, 1.5)
+    depths = np.zeros(11)
+    depths[[0, 5, 10]] = 2e-6, 1.01e-4, 4e-6
+    part, change = flattened(angles, depths)
+    found, begin, end = _deviation(part)
+    assert found == pytest.approx(change - 0.5 * (change[0] + change[-1]))
+    assert (begin, end) == pytest.approx((1.2, 1.3))
+    depths[5] = 1.2e-5  # 24 um less 6 um in the middle
+    assert _deviation(flattened(angles, depths)[0])[1:] == (1.0, 1.5)
+
+
+def test_steps_resolve_the_length_of_a_measured_flat(monkeypatch):
+    """Of a centimetre at least; it is no wave all around."""
+    for extent, length in ((0.1, 0.046), (0.001, 0.01)):
+        monkeypatch.setattr(out_of_round, "_deviation", lambda _, x=extent: (None, 1.0, 1.0 + x))
+        found = out_of_round._lengths(Sections.model_construct(), RADIUS)
+        assert found == (pytest.approx(length), np.inf)
