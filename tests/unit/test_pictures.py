@@ -1,5 +1,6 @@
 """Pictures of contact, creep forces and modes: plain numbers in the units of their axes."""
 
+from dataclasses import replace
 from types import SimpleNamespace as Made
 
 import matplotlib.pyplot as plt
@@ -303,3 +304,19 @@ def test_no_oscillation_is_said():
     far.eigenvalues = 100.0 * far.eigenvalues
     texts = [text.get_text() for axes in modes.locus_figure(far).axes for text in axes.texts]
     assert "no oscillation below 25 Hz" in texts
+
+
+@pytest.mark.parametrize("slope", [0.0, 1.0, -2.0])
+def test_smoothing_is_drawn_along_the_normal_in_micrometres(slope):
+    """Points on a straight contour that were measured 5 um deeper, and moved along it besides."""
+    y = 1e-3 * np.arange(-20.0, 21.0)
+    normal = np.array([-slope, 1.0]) / np.hypot(1.0, slope)  # z points down
+    along = np.array([1.0, slope]) / np.hypot(1.0, slope)
+    points = np.stack((y, slope * y))
+    moved = points + 5e-6 * normal[:, None] + 3e-6 * along[:, None]
+    profile = replace(Profile("p", "rail", *points), measured=moved)
+    axes = plt.figure().subplots()
+    contact._draw_smoothing(axes, [profile, profile])
+    found = curves(axes)
+    assert len(found) == 2
+    assert found[0] == pytest.approx(np.stack((1e3 * y, np.full(41, 5.0)), axis=1))

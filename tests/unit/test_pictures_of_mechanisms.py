@@ -1,6 +1,7 @@
 """Pictures of mechanisms: plain numbers in the units of their axes."""
 
 from collections import namedtuple
+from dataclasses import make_dataclass
 from types import SimpleNamespace as Made
 
 import matplotlib.pyplot as plt
@@ -281,3 +282,91 @@ def test_a_roller_is_kept_on_its_arc_a_bit_beyond_its_ends(monkeypatch, start):
 
     monkeypatch.setattr(cams, "solve", impossible)
     assert cams.on_one_arc(motion, 1, 3, 0.2) is None
+
+
+def two_results(**first):
+    ratio, force = 1.0 + HEIGHT, 1e3 + 100.0 * HEIGHT
+    zone = {k: {"height": x} for k, x in (("low", 0.1), ("work", 0.2), ("high", 0.3))}
+    one = made({"ratio": ratio, "force": force}, zone=zone, **first)
+    other = made({"ratio": ratio + 0.5, "force": force - 20.0}, zone=zone)
+    none = made({}, zone=zone)
+    return {"one": one, "other": other, "none": none}
+
+
+def test_mechanisms_are_compared_over_the_height(monkeypatch):
+    monkeypatch.setattr(plots, "force_units", lambda _: "N")
+    ratios, forces = plots.comparison_figure(two_results()).axes
+    x = 1e3 * HEIGHT
+    assert [*long(ratios).values()] == over(x, 1.0 + HEIGHT, 1.5 + HEIGHT)
+    assert [*long(forces).values()] == over(x, 1e3 + 100.0 * HEIGHT, 980.0 + 100.0 * HEIGHT)
+    assert [len(axes.patches) for axes in (ratios, forces)] == [1, 1]
+    assert forces.get_ylabel() == "force (N)"
+    above, force, less, change = plots.comparison_figure(two_results(), zoom=True).axes
+    inside = np.array([100.0, 300.0])
+    drawn = [line.get_xydata() for axes in (above, force, less, change) for line in axes.lines]
+    assert drawn == over(inside, [1.1, 1.3], [1.6, 1.8], [1010.0, 1030.0], [990.0, 1010.0],
+                         [0.0, 0.0], [0.5, 0.5], [0.0, 0.0], [-20.0, -20.0])  # fmt: skip
+    assert not above.patches
+
+
+def test_held_pressures_are_compared_with_their_contact_forces():
+    results = two_results(contact=Made(pressure=0.35e6, curve=70.0 + HEIGHT))
+    for result in list(results.values())[:2]:
+        result.output["pressure"] = 1e6 * (0.3 + HEIGHT)
+    needed, force = plots.held_figure(results).axes
+    assert [*long(needed).values()] == over(1e3 * HEIGHT, 0.3 + HEIGHT, 0.3 + HEIGHT)
+    assert [*long(force)] == ["one, 0.3500 MPa"]
+    assert [*long(force).values()] == over(1e3 * HEIGHT, 70.0 + HEIGHT)
+    assert needed.get_ylim()[0] == 0.0
+
+
+def test_ends_of_a_search_are_drawn_by_what_they_keep():
+    """A start that could not be assembled stands as high as the worst one."""
+    ends = [(1, 2.0, True), (2, 5.0, False), (3, np.inf, False), (4, 1.5, True), (5, 0.0, True)]
+    starts = [Start(*end) for end in ends]
+    optimum = Made(starts=starts, objective=1.5, objective_before=4.0)
+    (axes,) = plots.search_figure(optimum).axes
+    drawn = {line.get_label(): line.get_xydata().tolist() for line in axes.lines}
+    assert drawn["all constraints kept"] == [[1.0, 2.0], [4.0, 1.5]]
+    assert drawn["a constraint broken"] == [[2.0, 5.0]]
+    assert drawn["not assembled"] == [[3.0, 5.0]]
+    assert [y for _, y in drawn["best 1.5"]] == [1.5, 1.5]
+    assert [y for _, y in drawn["file 4"]] == [4.0, 4.0]
+    nothing = Made(starts=[Start(1, np.inf, False)], objective=0.0, objective_before=0.0)
+    (line,) = plots.search_figure(nothing).axes[0].lines
+    assert line.get_xydata().tolist() == [[1.0, 1.0]]
+
+
+Start = make_dataclass("Start", ["number", "objective", "feasible"])
+
+
+def test_lines_of_a_mechanism_are_drawn_at_one_position_in_millimetres():
+    xy = 1e-3 * np.arange(12.0).reshape(2, 3, 2)
+    axes = plt.figure().subplots()
+    parts = [drawing.Line(kind, "name", xy) for kind in ("link", "guide", "body")]
+    first, second, third = plots.draw(axes, parts, 1, "k", "words")
+    for line in (first, second, third):
+        assert line.get_xydata() == pytest.approx(np.array([[6.0, 7.0], [8.0, 9.0], [10.0, 11.0]]))
+    assert [line.get_marker() for line in (first, second, third)] == ["o", "", "o"]
+    assert first.get_label() == "words"
+    assert not {second.get_label(), third.get_label()} & {"words"}
+
+
+@pytest.mark.parametrize("box", [None, (0.0, 0.25, 0.0, 0.3)])
+def test_points_are_marked_where_they_are_at_first(monkeypatch, box):
+    """Triangles on the ground; outside of a box none."""
+    named = []
+    known = {"ground.A": [0.1, 0.2], "rod.B": [0.2, 0.1], "rod.C": [0.3, 0.1], "rod.D": [0.1, 0.4]}
+    monkeypatch.setattr(plots, "points", lambda _: {k: np.array([v]) for k, v in known.items()})
+    monkeypatch.setattr(plots, "joint_points", lambda _: {i: k for i, k in enumerate(known)})
+    monkeypatch.setattr(plots, "lines", lambda _: [])
+    monkeypatch.setattr(plots, "name_points", lambda axes, points, lines: named.append(points))
+    axes = plt.figure().subplots()
+    plots.mark_points(axes, None, box)
+    shown = {"A": [100.0, 200.0], "rod.B": [200.0, 100.0]}
+    if box is None:
+        shown |= {"rod.C": [300.0, 100.0], "rod.D": [100.0, 400.0]}
+    assert {name: pytest.approx(xy) for name, xy in shown.items()} == named[0]
+    drawn = [line.get_xydata()[0] for line in axes.lines]
+    assert np.array(drawn) == pytest.approx(np.array([*shown.values()]))
+    assert [line.get_marker() for line in axes.lines] == ["^"] + ["o"] * (len(shown) - 1)
