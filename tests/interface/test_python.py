@@ -2,24 +2,35 @@
 
 import base64
 import copy
+import inspect
 import math
 import pickle
+import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
+import click
 import example_result
 import numpy as np
 import pytest
 
 import railsim
+from railsim import fmi, observation, simulate
 from railsim.cli import main
+from railsim.cli import railsim as commands
+from railsim.contact.summary import contact_summary
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError, ModelError
 from railsim.linear.modes import Mode, Modes
 from railsim.linear.vehicle import Contact
+from railsim.mechanisms.analysis import analyse
 from railsim.result import Hdf5Sink
+from railsim.studies.assess_track import assess_track
+from railsim.studies.rail_wear import rail_wear
+from railsim.studies.stationary import stationary
+from railsim.studies.wear_loop import wear_loop
 from railsim.table import Table
 
 COACH = "coach_manchester"
@@ -370,3 +381,36 @@ def test_runs_in_threads_are_those_one_after_the_other(coach):
         found = list(pool.map(end, speeds))
     for state, speed in zip(found, speeds, strict=True):
         assert np.array_equal(state, end(speed))
+
+
+# functions of commands where they are not of its name
+OF_COMMANDS = {
+    "run": simulate, "stationary": stationary, "wear": wear_loop, "rail-wear": rail_wear,
+    "irregularity": observation.irregularity, "contact": contact_summary, "mechanism": analyse,
+    "fmu": fmi.fmu, "assess-track": assess_track,
+}  # fmt: skip
+
+
+def values(default):
+    """Numbers and words of a default; one that stands for several once."""
+    several = default if isinstance(default, list | tuple) else str(default).split(":")
+    return {float(x) if re.fullmatch(r"[-.\de]*\d", str(x)) else x for x in several}
+
+
+def test_a_command_and_its_function_begin_from_the_same_defaults():
+    context, differ, alike = click.Context(commands), [], 0
+    for name in commands.list_commands(context):
+        function = OF_COMMANDS.get(name, getattr(railsim, name.replace("-", "_"), None))
+        if not callable(function):
+            continue
+        own = inspect.signature(function).parameters
+        for option in commands.get_command(context, name).params:
+            parameter = own.get(option.name)
+            given = option.to_info_dict()["default"]
+            if None in (parameter, given) or parameter.default in (None, parameter.empty):
+                continue
+            alike += 1
+            if values(given) != values(parameter.default):
+                differ.append((name, option.name, given, parameter.default))
+    assert differ == []
+    assert alike > 25

@@ -188,6 +188,21 @@ def test_a_channel_is_wrong_by_sign_by_size_or_by_what_nobody_else_reads(
     assert bool(said) == bool(words)
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize(("share", "rests"), [(0.2e-9, True), (5e-9, False)])
+def test_a_channel_rests_by_its_size_over_the_largest_whatever_the_unit(unit, share, rests):
+    """A billionth of the channel that moves most."""
+    random = np.random.default_rng(5)
+    given = powers(random)
+    read = channels(random, given)
+    sizes = np.linalg.norm(read, axis=1)
+    read[3] *= share * sizes.max() / sizes[3]
+    piece = SimpleNamespace(valid=np.ones(read.shape, dtype=bool))
+    names = [f"channel {c}" for c in range(5)]
+    _, said = disagreeing_channels(given, piece, unit * read, names)
+    assert ("channel 3 rests: a dead sensor? It is left out." in said) is rests
+
+
 @pytest.mark.parametrize(("reading", "found"), [(4, {2}), (3, set())])
 def test_of_three_channels_none_can_be_said_to_be_the_wrong_one(reading, found):
     random = np.random.default_rng(5)
