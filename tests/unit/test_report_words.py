@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from railsim.assessment.verdict import FAIL, INCOMPLETE
+from railsim.errors import InputError
 from railsim.identification.identified import AT_BOUND
 from railsim.mechanisms.links import Course
 from railsim.report import limits, measured, mechanisms
@@ -64,8 +65,8 @@ BOUND = f"'a' {AT_BOUND}."
 @pytest.mark.parametrize(
     ("unidentified", "remarks", "white", "words", "ok", "left"),
     [
-        ([], ["other"], [True, None], "All parameters are identified; the residuals are white.", True,
-         ["other"]),
+        ([], ["other"], [True, None],
+         "All parameters are identified; the residuals are white.", True, ["other"]),
         (["a is like b"], ["other", BOUND], [False], "Not all parameters can be told apart.", False,
          ["other", BOUND]),
         ([], ["other", BOUND], [False], BOUND, False, ["other"]),
@@ -108,6 +109,32 @@ def test_wear_is_told_in_kilometres_or_megatonnes(monkeypatch, rails, ended):
     assert found.title == ("line: wear of the rails" if rails else "coach: wear of the wheels")
     assert found.ok is not bool(ended)
     assert found.sections[0].texts == ["a,b" if rails else "c"]
+
+
+@pytest.mark.parametrize("inside", [True, False])
+@pytest.mark.parametrize("kind", range(3))
+def test_a_record_is_known_by_its_name_alone_or_in_its_folder(monkeypatch, tmp_path, kind, inside):
+    """With the pictures beside it that are pictures."""
+    parts = "validation_part", "identification_part", "wear_part"
+    for k, name in enumerate(parts):
+        monkeypatch.setattr(measured, name, lambda record, pictures, k=k: (k, record, pictures))
+    monkeypatch.setattr(measured.ModelValidation, "of", lambda record: record)
+    monkeypatch.setattr(measured, "pictures", lambda given, captions, names: sorted(given))
+    assert not measured.is_measured(tmp_path)
+    path = tmp_path / ("model_validation.json", "identified.json", "wear.json")[kind]
+    assert not measured.is_measured(path)
+    path.write_text('{"a": 1}')
+    for name in ("overlays", "residuals", "wear"):
+        (tmp_path / f"{name}.png").write_bytes(b"\x89PNG\r\n\x1a\n and so on")
+    (tmp_path / "fits.png").write_bytes(b"\x89PNG\r\n\x1a? no picture")
+    given = tmp_path if inside else path
+    assert measured.is_measured(given)
+    pictures = (["overlays"], ["residuals"], ["wear"])[kind]
+    assert measured.read_part(given) == (kind, {"a": 1}, pictures)
+    path.rename(tmp_path / "other.json")
+    assert not measured.is_measured(tmp_path / "other.json")
+    with pytest.raises(InputError, match=r"model_validation\.json or identified\.json or wear"):
+        measured.read_part(tmp_path)
 
 
 def test_a_multiple_regression_is_shown_in_its_units():

@@ -3,6 +3,7 @@
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,11 +16,12 @@ from railsim.constants import GRAVITY
 from railsim.contact import contact_geometry
 from railsim.definitions.loading import load_vehicle, load_vehicle_text
 from railsim.errors import ModelError
-from railsim.kernels.state import velocity_begin
-from railsim.kernels.system import RADIUS
+from railsim.kernels.state import ARC_LENGTH, N_SCALARS, SPEED, velocity_begin
+from railsim.kernels.system import AXLEBOX, RADIUS, RIGID, WHEELSET
+from railsim.kernels.track_frame import OMEGA
 from railsim.linear.vehicle import on_cones
 from railsim.model.assembly import Index, assemble
-from railsim.model.equilibrium import RESIDUAL, _at_rest, equilibrium
+from railsim.model.equilibrium import RESIDUAL, _at_rest, equilibrium, initial_state
 from railsim.profiles import load_profile
 
 DATA = Path(__file__).parents[1] / "data" / "vehicles"
@@ -199,3 +201,23 @@ def test_wheels_of_unequal_wear_roll_where_their_radii_are_equal():
     rolling = found.state[6 * found.model.system.contact.body + 1]
     equal = np.interp(0.0, geometry.delta_r, lateral)
     np.testing.assert_allclose(rolling, equal, atol=0.3e-3)
+
+
+def test_bodies_begin_turning_with_the_track_below_them():
+    """At 20 m/s by 20 times the turn per metre of their frames; axle boxes not at all."""
+    kinds = [RIGID, AXLEBOX, WHEELSET]
+    bodies = SimpleNamespace(kind=np.array(kinds), frame=np.array([2, 0, 1]))
+    model = SimpleNamespace(index=SimpleNamespace(n_bodies=3),
+                            system=SimpleNamespace(bodies=bodies))  # fmt: skip
+    frames = np.zeros((3, 30))
+    frames[:, OMEGA : OMEGA + 3] = [[9.0, 9.0, 9.0], [0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]
+    rest = np.zeros(6 * 3 * 2 + N_SCALARS)
+    rest[SPEED] = 20.0
+    before = rest.copy()
+    found = initial_state(model, SimpleNamespace(state=rest), 150.0, frames)
+    rates = found[18:36].reshape(3, 6)
+    assert rates[:, 3:] == pytest.approx(np.array([[8.0, 10.0, 12.0], [0, 0, 0], [2.0, 4.0, 6.0]]))
+    assert not rates[:, :3].any()
+    assert not found[:18].any()
+    assert found[ARC_LENGTH] == 150.0
+    assert (rest == before).all()
