@@ -210,3 +210,29 @@ def test_conicity_is_looked_at_by_tenths_and_quarters_of_a_millimetre():
     steps = np.diff(millimetres)
     assert steps[:9] == pytest.approx(0.1)
     assert steps[9:] == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_pieces_of_a_branch_are_dashed_where_unstable_and_reach_their_neighbours(first):
+    """A point without a frequency is left out; one of single runs is marked and not divided."""
+    kinds = [first, first, not first, not first, first]
+    speeds = 10.0 * np.arange(1.0, 6.0)
+    values = np.array([1.0, 2.0, 3.0, np.nan, 5.0])
+    points = [Point(s, 1e-3, 1.0, stable=k) for s, k in zip(speeds, kinds, strict=True)]
+    axes = plt.figure().subplots()
+    plots._draw(axes, Branch("continuation", points), values)
+    stable, unstable = axes.lines
+    lines = {first: [1.0, 2.0, 3.0, np.nan], not first: [np.nan, np.nan, 3.0, 5.0]}
+    lines[first][3] = 5.0  # the last piece is of one point
+    for line, kind in ((stable, True), (unstable, False)):
+        assert line.get_xdata().tolist() == [10.0, 20.0, 30.0, 50.0]
+        assert line.get_ydata() == pytest.approx(lines[kind], nan_ok=True)
+    assert stable.get_linestyle() == "-" != unstable.get_linestyle()
+    assert stable.get_label() == "continuation, dashed: unstable" != unstable.get_label()
+    marked = plt.figure().subplots()
+    plots._draw(marked, Branch("up", points), values)
+    (line,) = marked.lines
+    assert line.get_ydata() == pytest.approx(values, nan_ok=True)
+    assert line.get_linestyle() != "-"
+    plots._draw(marked, Branch("up", [Point(s, 1e-3, 1.0) for s in speeds]), values)
+    assert marked.lines[1].get_linestyle() == "-"
