@@ -1,11 +1,14 @@
 """Searches with known answers: limits between the positions, forces by hand, catalogues."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from railsim.definitions.loading import load_mechanism
 from railsim.errors import InputError
+from railsim.mechanisms import optimisation
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.judgement import Judge, Judgement, is_firm
@@ -531,3 +534,30 @@ def test_largest_amount_is_least_on_a_kink():
         end, found = _rounds(problem, u, problem(u), FINISH)
         assert 6.0 * end - 3.0 == pytest.approx([0.0, 1.0, 2.0, -1.0], abs=1e-4)
         assert found.peak == pytest.approx(56.0, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "taken"),
+    [
+        ((5.0, 0.0), (4.0, 0.0), True), ((5.0, 0.0), (5.0, 0.0), False),
+        ((5.0, 0.0), (6.0, 0.0), False), ((5.0, 0.0), (4.0, 0.1), False),
+        ((5.0, 0.0), (6.0, 0.1), False), ((5.0, 0.2), (6.0, 0.1), True),
+        ((5.0, 0.2), (4.0, 0.3), False), ((5.0, 0.2), (6.0, 0.0), True),
+    ],
+)  # fmt: skip
+def test_a_round_is_kept_where_it_is_better_and_breaks_no_more(monkeypatch, before, after, taken):
+    """Objective, and by how much limits are broken; else it is tried again with fewer steps."""
+    tried = []
+
+    def round_of(problem, u, here, steps):
+        tried.append(steps)
+        return u + 1.0 if len(tried) < 9 else u
+
+    monkeypatch.setattr(optimisation, "_round", round_of)
+    monkeypatch.setattr(optimisation, "_least_breach", lambda problem, u, found: (u, found))
+    first, second = (SimpleNamespace(objective=o, violation=v) for o, v in (before, after))
+    effort = SimpleNamespace(steps=16, rounds=5, gain=0.5)
+    u, found = optimisation._rounds(lambda u: second, np.zeros(1), first, effort)
+    assert (found is second, u.tolist() != [0.0]) == (taken, taken)
+    if not taken:
+        assert tried[:3] == [16, 4, 1]
