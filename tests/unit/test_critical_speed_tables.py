@@ -1,7 +1,7 @@
 """Tables and pictures of critical speeds: plain numbers in their columns, units and words."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
@@ -10,7 +10,7 @@ import pytest
 
 from railsim.linear.vehicle import Contact
 from railsim.plot import stability as plots
-from railsim.stability import result
+from railsim.stability import continuation, result
 from railsim.stability.branches import Branch, Jump, Limit, Point
 from railsim.stability.result import OF_CONICITY, Conicity, CriticalSpeed, LinearLoss, OverAmplitude
 
@@ -236,3 +236,32 @@ def test_pieces_of_a_branch_are_dashed_where_unstable_and_reach_their_neighbours
     assert line.get_linestyle() != "-"
     plots._draw(marked, Branch("up", [Point(s, 1e-3, 1.0) for s in speeds]), values)
     assert marked.lines[1].get_linestyle() == "-"
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Lateral motions in their last row, above them twice the frequencies."""
+
+    lateral: np.ndarray
+
+    @property
+    def frequency(self):
+        return float(self.lateral[0, 0]) / 2.0
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "words"),
+    [
+        ([1.0, 1.2, 9.0], "the wheelsets hunt with 1.00, 1.20 Hz"), ([1.0, 1.0, 9.0], "shooting"),
+        ([1.0, 1.0 - 0.9 * continuation.APART, 9.0], "shooting"),
+        ([1.0, 1.0 - 1.1 * continuation.APART, 9.0], "the wheelsets hunt with 1.00"),
+    ],
+)  # fmt: skip
+def test_wheelsets_that_hunt_apart_are_told(frequencies, words):
+    """Of the third the motion is too small to tell its frequency."""
+    lateral = 2.0 * np.array([frequencies, frequencies])
+    lateral[1] += 2.0 * continuation.FIRST * np.array([1.1, -1.1, 0.9])
+    motion = SimpleNamespace(stretch=lambda state, low, high, time: Seen(lateral))
+    found = continuation._why(motion, Point(50.0, 5e-3, 1.1))
+    assert words in found
+    assert "9.00" not in found

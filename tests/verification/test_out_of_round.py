@@ -551,3 +551,14 @@ def test_steps_resolve_the_length_of_a_measured_flat(monkeypatch):
         monkeypatch.setattr(out_of_round, "_deviation", lambda _, x=extent: (None, 1.0, 1.0 + x))
         found = out_of_round._lengths(Sections.model_construct(), RADIUS)
         assert found == (pytest.approx(length), np.inf)
+
+
+def test_sections_rolled_the_other_way_have_the_same_radius_at_the_opposite_angle():
+    part = Sections(type="sections", angles=(-0.2, 0.1, 0.5), positions=(0.0, 0.01),
+                    heights=((1e-4, 2e-4), (3e-4, 4e-4), (5e-4, 6e-4)))  # fmt: skip
+    back = part.backwards()
+    radii = dict(zip(part.angles, part.heights, strict=True))
+    assert back.angles == (-0.5, -0.1, 0.2)
+    assert {-a: row for a, row in zip(back.angles, back.heights, strict=True)} == radii
+    assert back.backwards() == part
+    assert Sections(type="sections", file="a.slcw").backwards().file == "a.slcw"
