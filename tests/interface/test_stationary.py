@@ -16,7 +16,14 @@ from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.plot.stability import twist_figure
 from railsim.stability.curving import curving
-from railsim.studies.stationary import Stationary, StationaryValue, _force, stationary
+from railsim.studies.stationary import (
+    LIFTED,
+    UNLOADING,
+    Stationary,
+    StationaryValue,
+    _force,
+    stationary,
+)
 
 COACH = ["stationary", "benchmark_vehicle1", "--cant", "0.1"]
 
@@ -313,3 +320,14 @@ def test_where_newton_fails_steady_curving_gives_the_same_guiding_force(monkeypa
     monkeypatch.setattr(railsim.studies.stationary, "on_twist", never)
     assert _force(*given) == pytest.approx(by_newton, rel=2e-3)
     assert by_newton > 10e3
+
+
+@pytest.mark.usefixtures("small_contact_tables", "guided")
+@pytest.mark.parametrize(("unloading", "lifted"), [(0.999, False), (1.001, True)])
+def test_a_wheel_that_hangs_on_its_rail_is_told(monkeypatch, unloading, lifted):
+    """More than all of its load is off it."""
+    value = StationaryValue("twist", UNLOADING, unloading, None, "wheelset 1 left")
+    monkeypatch.setattr(railsim.studies.stationary, "_unloading", lambda *_: [value])
+    coach, track = railsim.load_vehicle("benchmark_vehicle1"), railsim.load_track("straight")
+    found = stationary(coach, track, load_stationary_limits("stationary"), cant=0.05)
+    assert (LIFTED in found.remarks) is lifted
