@@ -841,6 +841,15 @@ def test_runs_that_ended_early_are_called_so_beside_their_curves_and_peaks():
     assert curve_data(group)["runs"] == ["whole", "short · derailed"]
     peaks = _peaks([{"name": name, **run_facts(one)} for name, one in results.items()], results)
     assert peaks.tables[0].header == ["", "whole", "short · derailed"]
+    # of a peak that one run alone has, the other cell is empty: every row is as long as the head
+    records = [{"name": name, **run_facts(one)} for name, one in results.items()]
+    for without in (0, 1):
+        changed = [dict(record) for record in records]
+        changed[without]["peaks"] = changed[without]["peaks"][1:]
+        rows = _peaks(changed, results).tables[0].rows
+        assert {len(row) for row in rows} == {3}
+        assert [row[1 + without] for row in rows].count("") == 1
+        assert "" not in [row[2 - without] for row in rows]
 
 
 def test_study_writes_its_report_where_asked(tmp_path, simulated, capsys):

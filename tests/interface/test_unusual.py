@@ -211,7 +211,8 @@ def stop_after(travel):
 
 
 def slide(coefficient):
-    stick = {"friction_coefficient": [coefficient] * 3, "stick_stiffness": [4e6] * 3}
+    along = [0.5 * coefficient, coefficient, 0.1]  # the largest counts
+    stick = {"friction_coefficient": along, "stick_stiffness": [4e6] * 3}
     where = {"points": None, "point": [0.0, 1.0, -0.46]}
     return vehicle(spring={"kind": "friction", **where, **stick})
 
