@@ -272,14 +272,23 @@ def test_sections_in_which_a_channel_rests_are_counted_and_left_out(dies):
     """One wheel's load rests from `dies` on, the other's does not: that one has all sections."""
     on = track(*curve(300.0, 900.0), cant=0.12)
     result = made(
-        on, SPEED, rate=RATE, Q=lambda t, s: np.tile(load(t)[:, None, None], (1, 4, 2)),
+        on,
+        SPEED,
+        rate=RATE,
+        Q=lambda t, s: np.tile(load(t)[:, None, None], (1, 4, 2)),
         settings='{"outputs": {"low_pass": {"frequency": 80.0}}, "output_rate": 200.0}',
-    )  # fmt: skip
+    )
     t = np.arange(round(on.length / SPEED * RATE)) / RATE
-    how = MeasurementFile.model_validate({
-        "format": "railsim-measurement/1", "name": "m", "file": ["a.csv"], "rate": RATE,
-        "speed": SPEED, "channels": {f"c{k}": {"quantity": f"Q:1:{SIDES[k]}"} for k in (0, 1)},
-    })  # fmt: skip
+    how = MeasurementFile.model_validate(
+        {
+            "format": "railsim-measurement/1",
+            "name": "m",
+            "file": ["a.csv"],
+            "rate": RATE,
+            "speed": SPEED,
+            "channels": {f"c{k}": {"quantity": f"Q:1:{SIDES[k]}"} for k in (0, 1)},
+        }
+    )
     channels = {"c0": np.where(SPEED * t < dies, load(t), 55e3), "c1": load(t)}
     found = railsim.validate_model(
         Measurement(how, t, SPEED * t, np.full(len(t), SPEED), channels), result
@@ -298,9 +307,11 @@ def run_of(name, speed, load=None, track=None):
     made_of = SimpleNamespace(track=track, load=load)
     part, elsewhere = (SimpleNamespace(speed=np.full(10, x)) for x in (speed, 3.0 * speed))
     return SimpleNamespace(
-        name=name, definition=made_of, speed=elsewhere.speed,
+        name=name,
+        definition=made_of,
+        speed=elsewhere.speed,
         part=lambda begin, end: part if begin == 50.0 < end else elsewhere,
-    )  # fmt: skip
+    )
 
 
 class Made(dict):
@@ -317,8 +328,11 @@ class Made(dict):
 
 def test_a_measured_run_has_the_one_result_at_its_speed_and_in_its_load():
     results = {
-        "slow": Made(20.0), "fast": Made(40.0), "laden": Made(20.0, "laden"), "other": Made(20.41),
-    }  # fmt: skip
+        "slow": Made(20.0),
+        "fast": Made(40.0),
+        "laden": Made(20.0, "laden"),
+        "other": Made(20.41),
+    }
     runs = [run_of("a", 39.3), run_of("b", 20.4, "laden"), run_of("c", 19.7)]
     assert matched_results(runs[:2], results) == [results["fast"], results["laden"]]
     with pytest.raises(InputError) as refused:
@@ -339,15 +353,24 @@ def test_sections_lie_where_channel_and_reference_body_have_both_been(wheelset, 
     """
     on = track(*curve(300.0, 1000.0), cant=0.12)
     result = made(
-        on, SPEED, rate=RATE, Q=lambda t, s: np.tile(load(t)[:, None, None], (1, 4, 2)),
+        on,
+        SPEED,
+        rate=RATE,
+        Q=lambda t, s: np.tile(load(t)[:, None, None], (1, 4, 2)),
         settings='{"outputs": {"low_pass": {"frequency": 80.0}}, "output_rate": 200.0}',
-    )  # fmt: skip
+    )
     first, last = (round(s / SPEED * RATE) for s in (250.0, 250.0 + 8.0 * 70.0 + over))
     t = np.arange(first, last + 1) / RATE
-    how = MeasurementFile.model_validate({
-        "format": "railsim-measurement/1", "name": "m", "file": ["a.csv"], "rate": RATE,
-        "speed": SPEED, "channels": {"c": {"quantity": f"Q:{wheelset}:left"}},
-    })  # fmt: skip
+    how = MeasurementFile.model_validate(
+        {
+            "format": "railsim-measurement/1",
+            "name": "m",
+            "file": ["a.csv"],
+            "rate": RATE,
+            "speed": SPEED,
+            "channels": {"c": {"quantity": f"Q:{wheelset}:left"}},
+        }
+    )
     run = Measurement(how, t, SPEED * t, np.full(len(t), SPEED), {"c": load(t)})
     begins = sorted({pair.begin for pair in railsim.validate_model(run, result)["Q_max"].pairs})
     begin = SPEED * t[0] + max(0.0, OFFSETS[wheelset - 1])

@@ -385,10 +385,16 @@ def test_runs_in_threads_are_those_one_after_the_other(coach):
 
 # functions of commands where they are not of its name
 OF_COMMANDS = {
-    "run": simulate, "stationary": stationary, "wear": wear_loop, "rail-wear": rail_wear,
-    "irregularity": observation.irregularity, "contact": contact_summary, "mechanism": analyse,
-    "fmu": fmi.fmu, "assess-track": assess_track,
-}  # fmt: skip
+    "run": simulate,
+    "stationary": stationary,
+    "wear": wear_loop,
+    "rail-wear": rail_wear,
+    "irregularity": observation.irregularity,
+    "contact": contact_summary,
+    "mechanism": analyse,
+    "fmu": fmi.fmu,
+    "assess-track": assess_track,
+}
 
 
 def values(default):

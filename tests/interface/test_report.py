@@ -1023,17 +1023,20 @@ def test_ends_are_counted_by_their_reason_without_its_numbers_the_most_first():
         return {"name": name, "status": status, "status_reason": reason, "remarks": remarks}
 
     records = [
-        record("a", "failed", "no equilibrium"), record("b", "complete", "", "coarse"),
-        record("c", "derailed", "at 12.5 m"), record("d", "derailed", "at 130 m", "coarse"),
+        record("a", "failed", "no equilibrium"),
+        record("b", "complete", "", "coarse"),
+        record("c", "derailed", "at 12.5 m"),
+        record("d", "derailed", "at 130 m", "coarse"),
         record("e", "derailed", "wheel 2 off"),
-    ]  # fmt: skip
+    ]
     section = _remarks(records, ["one sentence"])
     ends, remarks = section.tables
     assert ends.caption == "4 of 5 runs did not reach the requested end"
     assert [row[:3] for row in ends.rows] == [
-        ["2", "derailed", "at 12.5 m"], ["1", "failed", "no equilibrium"],
+        ["2", "derailed", "at 12.5 m"],
+        ["1", "failed", "no equilibrium"],
         ["1", "derailed", "wheel 2 off"],
-    ]  # fmt: skip
+    ]
     assert remarks.rows == [["coarse", "b, d"]]
     assert section.texts == ["one sentence"]
     assert len(_remarks(records[1:2], []).texts) == 1

@@ -239,11 +239,13 @@ def test_many_curves_are_a_line_each_with_their_largest_medians():
     result = small([[[1.0, 2.0]]] * 3)
     curves = [
         SimpleNamespace(
-            radius=radius, full_curve=(begin, begin + 50.25), medians={"Q": None},
+            radius=radius,
+            full_curve=(begin, begin + 50.25),
+            medians={"Q": None},
             median_peaks=[SimpleNamespace(quantity=QUANTITIES["Q"], value=value)],
         )
         for radius, begin, value in ((250.0, 10.0, 61e3), (-300.0, 400.0, 7e4))
-    ]  # fmt: skip
+    ]
     table = full_curves_table(result, curves)
     assert table.texts() == [
         ["250 m", "10.0 to 60.2", "61.00"],

@@ -68,11 +68,12 @@ def test_methods_jumps_and_limits_have_their_rows():
     slow, odd = Point(50.0, 5e-3, 1.1), Point(44.0, 2e-3, np.nan, stable=False)
     branch = Branch("up", [Point(80.0, 6e-3, 1.5), Point(70.0, 6e-3, 1.5)])
     critical = found(
-        nonlinear={"bifurcation": slow, "threshold": odd, "ramp": None}, branches=[branch],
+        nonlinear={"bifurcation": slow, "threshold": odd, "ramp": None},
+        branches=[branch],
         jumps=[Jump("up", 63.0, 1e-3, 7e-3), Jump("down", 50.0, 6e-3, 0.5e-3)],
         amplitude_limit=Limit(66.0, 3e-3, True, 90.0),
         instability_limit=Limit(None, 8e3, False, 80.0),
-    )  # fmt: skip
+    )
     own = rows(critical)
     assert own["non-linear, bifurcation"] == [50.0, 1.1, 5e-3, ""]
     assert own["non-linear, threshold"] == [44.0, None, 2e-3, "unstable"]
@@ -110,11 +111,17 @@ def marks(critical):
 
 def test_critical_speeds_are_marked_in_metres_per_second_and_millimetres():
     line = OverAmplitude([1e-3, 2e-3, 4e-3], [None, 60.0, 5.0], [None, 1.0, 1.2])
-    drawn = marks(found(
-        linear=LinearLoss(61.0, 1.4, "hunting", None, 58.0), linear_over_amplitude=line,
-        nonlinear={"bifurcation": Point(50.0, 5e-3, 1.1), "ramp": None,
-                   "threshold": Point(44.0, 2e-3, 1.0, stable=False)},
-    ))  # fmt: skip
+    drawn = marks(
+        found(
+            linear=LinearLoss(61.0, 1.4, "hunting", None, 58.0),
+            linear_over_amplitude=line,
+            nonlinear={
+                "bifurcation": Point(50.0, 5e-3, 1.1),
+                "ramp": None,
+                "threshold": Point(44.0, 2e-3, 1.0, stable=False),
+            },
+        )
+    )
     upright = {name: xy[0, 0] for name, xy in drawn.items() if len(xy) == 2}
     assert sorted(upright.values()) == [58.0, 61.0]
     assert upright["the same on rigid rails: 58.00 m/s"] == 58.0
@@ -175,14 +182,16 @@ def test_a_record_holds_what_is_known_as_plain_data():
     assert [empty[key] for key in (*keys, "nonlinear")] == [None] * 5
     point = Point(50.0, 5e-3, 1.1)
     whole = found(
-        linear=LinearLoss(61.0, 1.4, "hunting"), nonlinear={"bifurcation": point, "ramp": None},
+        linear=LinearLoss(61.0, 1.4, "hunting"),
+        nonlinear={"bifurcation": point, "ramp": None},
         amplitude_limit=Limit(66.0, 3e-3, True, 90.0),
         instability_limit=Limit(None, 8e3, False, 80.0),
         conicity_over_amplitude=Conicity("w", [1e-3], [0.1]),
-    ).record()  # fmt: skip
-    assert [whole[key][name] for key, name in zip(
-        keys, ("speed", "speed", "searched_to", "conicity"), strict=True
-    )] == [61.0, 66.0, 80.0, [0.1]]  # fmt: skip
+    ).record()
+    assert [
+        whole[key][name]
+        for key, name in zip(keys, ("speed", "speed", "searched_to", "conicity"), strict=True)
+    ] == [61.0, 66.0, 80.0, [0.1]]
     assert whole["nonlinear_by_method"] == {"bifurcation": point.record(), "ramp": None}
     slowest = {"speed": 50.0, "amplitude": 5e-3, "frequency": 1.1, "stable": True}
     assert whole["nonlinear"] == {**slowest, "reached": True, "searched_to": 90.0}
@@ -252,11 +261,12 @@ class Seen:
 @pytest.mark.parametrize(
     ("frequencies", "words"),
     [
-        ([1.0, 1.2, 9.0], "the wheelsets hunt with 1.00, 1.20 Hz"), ([1.0, 1.0, 9.0], "shooting"),
+        ([1.0, 1.2, 9.0], "the wheelsets hunt with 1.00, 1.20 Hz"),
+        ([1.0, 1.0, 9.0], "shooting"),
         ([1.0, 1.0 - 0.9 * continuation.APART, 9.0], "shooting"),
         ([1.0, 1.0 - 1.1 * continuation.APART, 9.0], "the wheelsets hunt with 1.00"),
     ],
-)  # fmt: skip
+)
 def test_wheelsets_that_hunt_apart_are_told(frequencies, words):
     """Of the third the motion is too small to tell its frequency."""
     lateral = 2.0 * np.array([frequencies, frequencies])

@@ -14,9 +14,15 @@ from railsim.mechanisms.tables import sentences
 def said(monkeypatch, *, solves=False, loaded=True, **given):
     monkeypatch.setattr(tables, "is_loaded", lambda _: loaded)
     nothing = {
-        "output": {}, "force_zeros": (), "rests": (), "transitions": (), "contact": None,
-        "timed": None, "release": None, "motion": None,
-    }  # fmt: skip
+        "output": {},
+        "force_zeros": (),
+        "rests": (),
+        "transitions": (),
+        "contact": None,
+        "timed": None,
+        "release": None,
+        "motion": None,
+    }
     model = Made(start=np.radians(10.0), end=np.radians(50.0))
     of = Made(driver=Made(angle=0.0), solve="force" if solves else None)
     return sentences(Made(definition=of, model=model, **nothing | given))
@@ -45,9 +51,10 @@ def test_positions_of_rest_are_told_in_degrees(monkeypatch):
 def test_arcs_of_a_cam_meet_with_their_gap_and_jump(monkeypatch):
     """The rate changes from 0.5 to 0.51, by 2 %."""
     found = said(
-        monkeypatch, loaded=False,
+        monkeypatch,
+        loaded=False,
         transitions=(Transition("cam", np.radians(15.0), 1, 2, 12.5e-6, 0.5, 0.51),),
-    )  # fmt: skip
+    )
     assert found == ["cam: from arc 1 to 2 at 15.0000 deg, gap 0.0125 mm, jump of the rate 2.000 %"]
 
 
@@ -55,12 +62,18 @@ def test_arcs_of_a_cam_meet_with_their_gap_and_jump(monkeypatch):
     ("s", "reached", "words"),
     [
         ([20.0, 30.0, 50.0], True, "reaches 50.0000 deg after 2.00000 s"),
-        ([20.0, 53.0, 40.0], False, "is then at 40.0000 deg after 2.00000 s; it leaves the travel, "
-                                    "up to 53.0000 deg"),
-        ([20.0, 5.0, 10.0], True, "reaches 10.0000 deg after 2.00000 s; it leaves the travel, "
-                                  "up to 5.0000 deg"),
+        (
+            [20.0, 53.0, 40.0],
+            False,
+            "is then at 40.0000 deg after 2.00000 s; it leaves the travel, up to 53.0000 deg",
+        ),
+        (
+            [20.0, 5.0, 10.0],
+            True,
+            "reaches 10.0000 deg after 2.00000 s; it leaves the travel, up to 5.0000 deg",
+        ),
     ],
-)  # fmt: skip
+)
 def test_how_it_moves_once_let_go_is_told(monkeypatch, s, reached, words):
     released = Made(reached=reached, s=np.radians(s), time=np.array([0.0, 1.0, 2.0]))
     found = said(monkeypatch, loaded=False, release=released)
@@ -77,8 +90,14 @@ def test_a_contact_force_is_told_with_its_senses_and_rests(monkeypatch):
     silent = Made(**vars(plain) | {"reason": "why"})
     assert said(monkeypatch, loaded=False, contact=silent)[1:] == ["why"]
     rests = Rest(0.5, 0.4, 0.6, True), Rest(0.8, 0.8, 0.8, False)
-    rough = Made(pressure=0.35e6, force=both, rising={"a": 80.0}, falling={"a": 60.0},
-                    reason="why", rests=rests)  # fmt: skip
+    rough = Made(
+        pressure=0.35e6,
+        force=both,
+        rising={"a": 80.0},
+        falling={"a": 60.0},
+        reason="why",
+        rests=rests,
+    )
     assert said(monkeypatch, loaded=False, contact=rough) == [
         "contact force at 0.35000 MPa: least 70.00 N, most no value (mean); rising a 80.00 N; "
         "falling a 60.00 N",

@@ -38,11 +38,15 @@ def made_geometry():
     both = np.stack((lateral, 10e-3 + 3.0 * lateral), axis=1)
     angle = np.radians(np.array([50.0, 40.0, 2.0, 3.0, 2.0, 40.0, 50.0]))
     return Made(
-        lateral=lateral, delta_r=5.0 * lateral**3 / 1e-6, roll=7.0 * lateral,
-        rolling_radius=0.46 + both, contact_angle=np.stack((angle, angle / 2.0), axis=1),
-        wheel_y=2.0 * both, contact_y=np.array([-1.0, 1.0]) * (0.75 + both),
+        lateral=lateral,
+        delta_r=5.0 * lateral**3 / 1e-6,
+        roll=7.0 * lateral,
+        rolling_radius=0.46 + both,
+        contact_angle=np.stack((angle, angle / 2.0), axis=1),
+        wheel_y=2.0 * both,
+        contact_y=np.array([-1.0, 1.0]) * (0.75 + both),
         jumps=lambda: [(-1.5e-3, 2e-3), (2.5e-3, 1e-3)],
-    )  # fmt: skip
+    )
 
 
 def test_functions_of_contact_are_drawn_in_their_units():
@@ -58,15 +62,18 @@ def test_functions_of_contact_are_drawn_in_their_units():
     own = np.stack((y, 10.0 + 3.0 * y))  # of both sides [mm]
     angles = np.array([50.0, 40.0, 2.0, 3.0, 2.0, 40.0, 50.0])
     for label, values in {
-        "rolling radius (mm)": 460.0 + own, "contact angle (deg)": (angles, angles / 2.0),
-        "outwards on the wheel (mm)": 2.0 * own, "distance from track centre (mm)": 750.0 + own,
-    }.items():  # fmt: skip
+        "rolling radius (mm)": 460.0 + own,
+        "contact angle (deg)": (angles, angles / 2.0),
+        "outwards on the wheel (mm)": 2.0 * own,
+        "distance from track centre (mm)": 750.0 + own,
+    }.items():
         for found, expected in zip(curves(axes[label]), values, strict=True):
             assert found == pytest.approx(np.stack((y, expected), axis=1))
     limits = {  # over -2 to 2 mm, where the larger angle of both is below 45 degrees
-        "rolling radius difference $\\Delta r$ (mm)": (-40.0, 40.0), "roll (mrad)": (-14.0, 14.0),
+        "rolling radius difference $\\Delta r$ (mm)": (-40.0, 40.0),
+        "roll (mrad)": (-14.0, 14.0),
         "rolling radius (mm)": (458.0, 476.0),
-    }  # fmt: skip
+    }
     for label, (low, high) in limits.items():
         margin = 0.25 * (high - low)
         assert axes[label].get_ylim() == pytest.approx((low - margin, high + margin), abs=1e-4)
@@ -125,8 +132,9 @@ def test_profiles_lie_on_each_other_with_their_difference_above_the_first():
 
 
 def loaded(*patches):
-    return Made(patches=[Made(y=y, a=a, b=b, angle=angle, zone=zone)
-                         for y, a, b, angle, zone in patches])  # fmt: skip
+    return Made(
+        patches=[Made(y=y, a=a, b=b, angle=angle, zone=zone) for y, a, b, angle, zone in patches]
+    )
 
 
 def test_patches_are_ellipses_seen_from_above():
@@ -195,9 +203,11 @@ def test_creep_curves_are_shares_of_the_friction_over_creepage(monkeypatch):
     given = np.array([creepages for _, creepages in asked]).reshape(len(CASES), 3, 3)
     for found, direction in zip(given, CASES.values(), strict=True):
         assert found == pytest.approx(sizes[:, None] * patch.unit_creepages(direction))
-    assert not [line for line in creep.creep_curves_figure(patch, ["polach"], exact_points=0).axes[
-        0
-    ].lines if len(line.get_xdata()) == 3]  # fmt: skip
+    assert not [
+        line
+        for line in creep.creep_curves_figure(patch, ["polach"], exact_points=0).axes[0].lines
+        if len(line.get_xdata()) == 3
+    ]
 
 
 def test_the_traction_is_drawn_forward_up_and_to_the_right():
@@ -209,8 +219,16 @@ def test_the_traction_is_drawn_forward_up_and_to_the_right():
     t_x, t_y = (1e6 * np.arange(24.0).reshape(strips, cells) * factor for factor in (3.0, -4.0))
     sticks = np.zeros((strips, cells), dtype=bool)
     sticks[1, 4:] = True
-    made = Made(x=x, y=np.repeat(across[:, None], cells, axis=1), t_x=t_x, t_y=t_y, sticks=sticks,
-                bound=np.full((strips, cells), 200e6), T_x=6e3, T_y=-12e3)  # fmt: skip
+    made = Made(
+        x=x,
+        y=np.repeat(across[:, None], cells, axis=1),
+        t_x=t_x,
+        t_y=t_y,
+        sticks=sticks,
+        bound=np.full((strips, cells), 200e6),
+        T_x=6e3,
+        T_y=-12e3,
+    )
     figure = creep.traction_figure({"half": made}, 24e3)
     panel = figure.axes[0]
     assert panel.get_title("left") == "half\n$T_x$ +0.25, $T_y$ −0.50 $\\mu N$"
@@ -227,8 +245,12 @@ def test_the_traction_is_drawn_forward_up_and_to_the_right():
         assert places[1:-1, 0, 1] == pytest.approx(between)
         # the borders at the ends lie around the first and the last cell
         assert places[[0, -1], 0, 1] + between[[0, -1]] == pytest.approx(2e3 * x[j, [0, -1]])
-    (held,) = [c for c in panel.collections if type(c).__name__ == "FillBetweenPolyCollection"
-               or (isinstance(c, PolyCollection) and not isinstance(c, Quiver))]  # fmt: skip
+    (held,) = [
+        c
+        for c in panel.collections
+        if type(c).__name__ == "FillBetweenPolyCollection"
+        or (isinstance(c, PolyCollection) and not isinstance(c, Quiver))
+    ]
     low, high = held.get_paths()[0].vertices.min(axis=0), held.get_paths()[0].vertices.max(axis=0)
     borders = np.asarray(meshes[1].get_coordinates())[:, 0, 1]
     assert [*low, *high] == pytest.approx([-4.0 / 3.0, borders[4], 4.0 / 3.0, borders[8]])
@@ -252,9 +274,12 @@ def made_locus(**given):
     zeta = np.array([[0.1, -0.05, 0.1, 0.2], [0.2, 0.05, 0.1, np.nan]])
     made = {
         "names": ["hunting", "carbody bounce", "wheelset 1", "bogie pitch"],
-        "eigenvalues": at * (-zeta + 1j * np.sqrt(1.0 - zeta**2)), "values": [10.0, 20.0],
-        "key": "speed", "unit": "m/s", "title": "coach: straight",
-    }  # fmt: skip
+        "eigenvalues": at * (-zeta + 1j * np.sqrt(1.0 - zeta**2)),
+        "values": [10.0, 20.0],
+        "key": "speed",
+        "unit": "m/s",
+        "title": "coach: straight",
+    }
     return Made(**{**made, **given})
 
 

@@ -28,13 +28,23 @@ def closed():
 def made(output=(), *, axis=1, angle=0.0, **given):
     """Results of a mechanism driven by an angle, or, without one, by a length."""
     of = {
-        "driver": Made(angle=angle), "angles": {}, "solve": None, "unknown": "cylinder",
-        "output": Made(point="pan"), "optimise": None, "held_by": None, "joints": {},
-    } | given.pop("definition", {})  # fmt: skip
+        "driver": Made(angle=angle),
+        "angles": {},
+        "solve": None,
+        "unknown": "cylinder",
+        "output": Made(point="pan"),
+        "optimise": None,
+        "held_by": None,
+        "joints": {},
+    } | given.pop("definition", {})
     plain = {"zone": {}, "contact": None, "timed": None, "transitions": ()} | given
     model = plain.pop("model", Made(axis=axis))
-    return Made(output={"travel": S, "height": HEIGHT, **dict(output)},
-                definition=Made(**of), model=model, **plain)  # fmt: skip
+    return Made(
+        output={"travel": S, "height": HEIGHT, **dict(output)},
+        definition=Made(**of),
+        model=model,
+        **plain,
+    )
 
 
 def zone_of(name, low, work, high):
@@ -78,11 +88,17 @@ def test_a_path_is_drawn_in_millimetres():
 def test_transmission_angles_are_folded_and_have_their_limit():
     """An angle of 130 degrees between two lines is one of 50; a limit of 40 is named."""
     angles = {"one": Made(limited=True), "two": Made(limited=False)}
-    output = {"one": np.radians([130.0, 50.0, 90.0, -30.0]), "two": S,
-              "cam_pressure_angle": np.radians([5.0, -5.0, 1.0, 2.0])}  # fmt: skip
+    output = {
+        "one": np.radians([130.0, 50.0, 90.0, -30.0]),
+        "two": S,
+        "cam_pressure_angle": np.radians([5.0, -5.0, 1.0, 2.0]),
+    }
     limits = Made(min_transmission_angle="a")
-    result = made(output, definition={"angles": angles, "optimise": limits},
-                  model=Made(axis=1, number=lambda _: np.radians(40.0)))  # fmt: skip
+    result = made(
+        output,
+        definition={"angles": angles, "optimise": limits},
+        model=Made(axis=1, number=lambda _: np.radians(40.0)),
+    )
     (axes,) = plots.angles_figure(result).axes
     found, degrees = long(axes), np.degrees(S)
     assert [found["one"]] == over(degrees, [50.0, 50.0, 90.0, 30.0])
@@ -114,9 +130,14 @@ def test_pressures_are_in_megapascals_over_the_height_or_the_length():
 def test_a_contact_force_is_drawn_with_both_senses_and_its_rests():
     """Filled where the output comes back to its height, open where it does not."""
     curve = np.array([70.0, 71.0, 69.0, 70.0])
-    contact = Made(curve=curve, pressure=0.35e6, bounds=(curve + 5.0, curve - 5.0),
-                   rising={"low": 1.0}, falling={"low": 2.0},
-                   equilibria=((0.2, True), (0.4, False)))  # fmt: skip
+    contact = Made(
+        curve=curve,
+        pressure=0.35e6,
+        bounds=(curve + 5.0, curve - 5.0),
+        rising={"low": 1.0},
+        falling={"low": 2.0},
+        equilibria=((0.2, True), (0.4, False)),
+    )
     (axes,) = plots.contact_figure(made(contact=contact)).axes
     assert [*long(axes)] == ["at 0.3500 MPa", "rising", "falling"]
     assert [*long(axes).values()] == over(1e3 * HEIGHT, curve, curve + 5.0, curve - 5.0)
@@ -133,8 +154,11 @@ def test_a_carpet_has_a_line_for_each_pressure_and_the_load(monkeypatch):
     table = Made(heights=heights, pressures=pressures, forces=forces)
     monkeypatch.setattr(plots, "table_of", lambda *_: table)
     length, load = 0.2 + 0.1 * HEIGHT, 1e3 * np.array([12.0, 13.0, 15.0, 14.0])
-    result = made({"length": length, "force": load}, motion=None,
-                  definition={"held_by": AirSpring.model_construct()})  # fmt: skip
+    result = made(
+        {"length": length, "force": load},
+        motion=None,
+        definition={"held_by": AirSpring.model_construct()},
+    )
     (axes,) = plots.carpet_figure(result).axes
     first, second, drawn = (line.get_xydata() for line in axes.lines)
     assert [first, second] == over([200.0, 250.0, 300.0], [10, 11, 12], [20, 21, 23])
@@ -142,14 +166,19 @@ def test_a_carpet_has_a_line_for_each_pressure_and_the_load(monkeypatch):
     assert axes.lines[-1].get_label() == "load"
     texts = {text.get_text(): text.xy for text in axes.texts}
     assert texts == {
-        "0.3 MPa": pytest.approx((200.0, 10.0)), "0.45 MPa": pytest.approx((200.0, 20.0)),
-    }  # fmt: skip
+        "0.3 MPa": pytest.approx((200.0, 10.0)),
+        "0.45 MPa": pytest.approx((200.0, 20.0)),
+    }
     assert axes.get_xlim()[0] < 200.0
 
 
 def test_gas_springs_have_their_length_in_millimetres_and_their_push():
-    output = {"a_length": 0.3 + HEIGHT, "a_force": 500.0 + S, "b_length": 0.5 - HEIGHT / 2.0,
-              "b_force": 300.0 - S}  # fmt: skip
+    output = {
+        "a_length": 0.3 + HEIGHT,
+        "a_force": 500.0 + S,
+        "b_length": 0.5 - HEIGHT / 2.0,
+        "b_force": 300.0 - S,
+    }
     length, push = plots.gas_spring_figure(made(output)).axes
     degrees = np.degrees(S)
     assert [*long(length).values()] == over(degrees, 300.0 + 1e3 * HEIGHT, 500.0 - 500.0 * HEIGHT)
@@ -165,8 +194,12 @@ def test_motion_in_time_has_speed_and_acceleration_of_the_output(monkeypatch, un
     time = np.array([0.0, 0.5, 1.0])
     speed = np.array([[0.3, -0.4], [0.6, 0.8], [0.0, 1.0]])
     point = (speed, 2.0 * speed)
-    timed = Made(time=time, motion=Made(s=S[:3]), force=np.array([5.0, 6.0, 7.0]),
-                 point=lambda name: point if name == "pan" else None)  # fmt: skip
+    timed = Made(
+        time=time,
+        motion=Made(s=S[:3]),
+        force=np.array([5.0, 6.0, 7.0]),
+        point=lambda name: point if name == "pan" else None,
+    )
     driver, force, first, second = plots.time_figure(made(timed=timed)).axes
     assert [line.get_xydata() for line in driver.lines] == over(time, np.degrees(S[:3]))
     assert [line.get_xydata() for line in force.lines] == over(time, timed.force)
@@ -208,9 +241,13 @@ def test_the_rate_on_a_cam_is_drawn_arc_by_arc_and_beyond(monkeypatch, angle):
     monkeypatch.setattr(plots, "on_one_arc", alone)
     linkage = Made(joint=np.array([[0, 0, 0, 0, 7, 2]]))
     result = made(
-        motion=motion, angle=angle, model=Made(axis=1, linkage=linkage), travel=-0.5,
-        definition={"joints": {"cam": cam}}, transitions=(Made(travel=S[1]),),
-    )  # fmt: skip
+        motion=motion,
+        angle=angle,
+        model=Made(axis=1, linkage=linkage),
+        travel=-0.5,
+        definition={"joints": {"cam": cam}},
+        transitions=(Made(travel=S[1]),),
+    )
     (axes,) = plots.cam_figure(result).axes
     scale = 1e3 if angle is None else 180.0 / np.pi
     first, beyond, second, at = axes.lines[:4]
@@ -228,10 +265,13 @@ def test_a_cam_is_drawn_from_the_begin_to_the_end_of_its_arcs():
     """A quarter to the left, then three quarters to the right, then a circle without ends."""
     ends = np.array([[1, 0, 0, 1, 1], [1, 0, 0, 1, -1], [0, 0, 0, 0, 1]], dtype=float)
     linkage = Made(
-        joint=np.array([[9, 9, 9, 9, 9, 9], [0, 0, 0, 0, 0, 3]]), arc_ends=ends,
-        arc_radius=np.array([[0.5, 0.25, 2.0]]), arc_point=np.array([0, 1, 1]),
-        point=np.array([[[1.0, 2.0], [3.0, 4.0]]]), point_body=np.array([0, 5]),
-    )  # fmt: skip
+        joint=np.array([[9, 9, 9, 9, 9, 9], [0, 0, 0, 0, 0, 3]]),
+        arc_ends=ends,
+        arc_radius=np.array([[0.5, 0.25, 2.0]]),
+        arc_point=np.array([0, 1, 1]),
+        point=np.array([[[1.0, 2.0], [3.0, 4.0]]]),
+        point_body=np.array([0, 5]),
+    )
     moved = {0: 0.0, 5: 10.0}  # how far the bodies lie to the right
 
     def at(body, x, y):
@@ -244,9 +284,12 @@ def test_a_cam_is_drawn_from_the_begin_to_the_end_of_its_arcs():
     assert (line.kind, line.name) == ("cam", "cam")
     (outline,) = line.xy
     for k, (centre, radius, turn) in enumerate(
-        [((1.0, 2.0), 0.5, 0.5 * np.pi), ((13.0, 4.0), 0.25, -1.5 * np.pi),
-         ((13.0, 4.0), 2.0, 2.0 * np.pi)]
-    ):  # fmt: skip
+        [
+            ((1.0, 2.0), 0.5, 0.5 * np.pi),
+            ((13.0, 4.0), 0.25, -1.5 * np.pi),
+            ((13.0, 4.0), 2.0, 2.0 * np.pi),
+        ]
+    ):
         x, y = (outline[k * drawing.ARC_POINTS : (k + 1) * drawing.ARC_POINTS] - centre).T
         assert np.hypot(x, y) == pytest.approx(radius)
         turned = np.unwrap(np.arctan2(y, x))
@@ -262,8 +305,13 @@ def test_a_roller_is_kept_on_its_arc_a_bit_beyond_its_ends(monkeypatch, start):
     joint = np.arange(12).reshape(2, 6)
     model = Made(linkage=Linkage(joint, np.ones((4, 5))), start=start, end=2.0 - start)
     s = np.array([0.3, 0.6, 0.9, 1.5])
-    motion = Made(model=model, arcs=np.array([[0, 2], [0, 3], [0, 3], [0, 2]]), s=s,
-                  q=np.arange(4.0)[:, None], known={"x": 1})  # fmt: skip
+    motion = Made(
+        model=model,
+        arcs=np.array([[0, 2], [0, 3], [0, 3], [0, 2]]),
+        s=s,
+        q=np.arange(4.0)[:, None],
+        known={"x": 1},
+    )
     monkeypatch.setattr(cams, "replace", lambda one, **given: Made(**vars(one) | given))
     solved = []
     monkeypatch.setattr(cams, "solve", lambda *given: solved.append(given) or "found")
@@ -304,8 +352,17 @@ def test_mechanisms_are_compared_over_the_height(monkeypatch):
     above, force, less, change = plots.comparison_figure(two_results(), zoom=True).axes
     inside = np.array([100.0, 300.0])
     drawn = [line.get_xydata() for axes in (above, force, less, change) for line in axes.lines]
-    assert drawn == over(inside, [1.1, 1.3], [1.6, 1.8], [1010.0, 1030.0], [990.0, 1010.0],
-                         [0.0, 0.0], [0.5, 0.5], [0.0, 0.0], [-20.0, -20.0])  # fmt: skip
+    assert drawn == over(
+        inside,
+        [1.1, 1.3],
+        [1.6, 1.8],
+        [1010.0, 1030.0],
+        [990.0, 1010.0],
+        [0.0, 0.0],
+        [0.5, 0.5],
+        [0.0, 0.0],
+        [-20.0, -20.0],
+    )
     assert not above.patches
 
 

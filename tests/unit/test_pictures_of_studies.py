@@ -61,13 +61,19 @@ def test_ticks_are_round_radii_within_those_drawn():
 def test_differences_are_counted_over_their_limit():
     """Two of three differences at half of the limit, one at -2: bins of 0.175 from -2.1 on."""
     one = Made(
-        pairs=[Made(difference=d) for d in (1e3, 1e3, -4e3)], quantity=Made(words="wheel load"),
-        limit=2e3, mean=-2e3 / 3.0, verdict="fail",
-    )  # fmt: skip
+        pairs=[Made(difference=d) for d in (1e3, 1e3, -4e3)],
+        quantity=Made(words="wheel load"),
+        limit=2e3,
+        mean=-2e3 / 3.0,
+        verdict="fail",
+    )
     empty = Made(pairs=[])
     axes, *_ = validation.differences(Made(comparisons=[one, empty])).axes
-    counts = {round(bar.get_x() + bar.get_width() / 2.0, 4): bar.get_height()
-              for bar in axes.patches if bar.get_height()}  # fmt: skip
+    counts = {
+        round(bar.get_x() + bar.get_width() / 2.0, 4): bar.get_height()
+        for bar in axes.patches
+        if bar.get_height()
+    }
     # 24 bins over 4.2: those around 0.5 and -2
     assert counts == {0.4375: 2.0, -2.0125: 1.0}
     lines = sorted(line.get_xdata()[0] for line in axes.lines)

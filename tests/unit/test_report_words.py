@@ -52,8 +52,14 @@ def test_tables_of_a_part_after_the_first_are_folded():
 def test_a_comparison_is_judged_in_words(monkeypatch, verdict, words, ok):
     monkeypatch.setattr(measured, "validation_figures", lambda _: {})
     one = Table(["a"], [])
-    made = Made(verdict=verdict, title="t", remarks=["r"], edition="edition",
-                table=lambda: one, section_table=lambda: one)  # fmt: skip
+    made = Made(
+        verdict=verdict,
+        title="t",
+        remarks=["r"],
+        edition="edition",
+        table=lambda: one,
+        section_table=lambda: one,
+    )
     found = measured.validation_part(made)
     assert (found.verdict, found.ok, found.remarks) == (words, ok, ["r"])
     assert found.method[-1] == "edition"
@@ -65,22 +71,38 @@ BOUND = f"'a' {AT_BOUND}."
 @pytest.mark.parametrize(
     ("unidentified", "remarks", "white", "words", "ok", "left"),
     [
-        ([], ["other"], [True, None],
-         "All parameters are identified; the residuals are white.", True, ["other"]),
-        (["a is like b"], ["other", BOUND], [False], "Not all parameters can be told apart.", False,
-         ["other", BOUND]),
+        (
+            [],
+            ["other"],
+            [True, None],
+            "All parameters are identified; the residuals are white.",
+            True,
+            ["other"],
+        ),
+        (
+            ["a is like b"],
+            ["other", BOUND],
+            [False],
+            "Not all parameters can be told apart.",
+            False,
+            ["other", BOUND],
+        ),
         ([], ["other", BOUND], [False], BOUND, False, ["other"]),
         ([], ["other"], [False, True], None, False, ["other"]),
     ],
-)  # fmt: skip
+)
 def test_an_identification_is_judged_by_the_worst_of_its_faults(
     monkeypatch, unidentified, remarks, white, words, ok, left
 ):
     for name in ("parameter_table", "correlation_table", "residual_table"):
         monkeypatch.setattr(measured, name, lambda _: Table(["a"], []))
     channels = [{"channel": f"c{k}", "white": one} for k, one in enumerate(white)]
-    record = {"unidentified": unidentified, "remarks": remarks, "channels": channels,
-              "vehicle": "coach"}  # fmt: skip
+    record = {
+        "unidentified": unidentified,
+        "remarks": remarks,
+        "channels": channels,
+        "vehicle": "coach",
+    }
     found = identification_part(record, [])
     if words is None:
         assert "c0" in found.verdict
@@ -140,15 +162,17 @@ def test_a_record_is_known_by_its_name_alone_or_in_its_folder(monkeypatch, tmp_p
 def test_a_multiple_regression_is_shown_in_its_units():
     """Y = 20 kN + 0.2 kN per mm + 3 kN per 1/km: coefficients are of 1/m and of m."""
     rule = Made(words="guiding force", unit="kN", scale=1e-3, text=lambda x: f"{1e-3 * x:.1f}")
-    solved = Made(N=17, coefficients=(20e3, 200e3, 3e6), error=1500.0, determination=0.876,
-                  value=61e3)  # fmt: skip
+    solved = Made(
+        N=17, coefficients=(20e3, 200e3, 3e6), error=1500.0, determination=0.876, value=61e3
+    )
     one = Made(criterion=rule, regression=solved, place="axle 1", population="laden")
     two = Made(criterion=rule, regression=solved, place="axle 1", population="")
     table = limits._influences(Made(vehicle="coach", influences=[one, two]))
     shown = ["kN", "17", "20", "0.2", "3", "1.5", "0.88", "61.0"]
     assert table.rows == [
-        [("guiding force", "axle 1, laden"), *shown], [("guiding force", "axle 1"), *shown],
-    ]  # fmt: skip
+        [("guiding force", "axle 1, laden"), *shown],
+        [("guiding force", "axle 1"), *shown],
+    ]
 
 
 def columns(data):
@@ -174,8 +198,13 @@ def test_motions_are_written_in_si_with_their_units(monkeypatch):
         assert found[f"{name} first [{unit}/rad]"] == [0.3, 0.4]
         assert found[f"{name} second [{unit}/rad2]"] == [0.5, 0.6]
     velocity = np.array([[1.0, 2.0], [3.0, 4.0]])
-    timed = Made(time=[0.0, 0.1], motion=Made(s=[0.0, 1.0]), force=[5.0, 6.0],
-                 in_time=lambda given: given, point=lambda _: (velocity, -velocity))  # fmt: skip
+    timed = Made(
+        time=[0.0, 0.1],
+        motion=Made(s=[0.0, 1.0]),
+        force=[5.0, 6.0],
+        in_time=lambda given: given,
+        point=lambda _: (velocity, -velocity),
+    )
     found = columns(mechanisms.motion_table(Made(definition=definition, timed=timed)))
     assert found["time [s]"] == [0.0, 0.1]
     assert found["travel [rad]"] == [0.0, 1.0]

@@ -207,8 +207,9 @@ def test_bodies_begin_turning_with_the_track_below_them():
     """At 20 m/s by 20 times the turn per metre of their frames; axle boxes not at all."""
     kinds = [RIGID, AXLEBOX, WHEELSET]
     bodies = SimpleNamespace(kind=np.array(kinds), frame=np.array([2, 0, 1]))
-    model = SimpleNamespace(index=SimpleNamespace(n_bodies=3),
-                            system=SimpleNamespace(bodies=bodies))  # fmt: skip
+    model = SimpleNamespace(
+        index=SimpleNamespace(n_bodies=3), system=SimpleNamespace(bodies=bodies)
+    )
     frames = np.zeros((3, 30))
     frames[:, OMEGA : OMEGA + 3] = [[9.0, 9.0, 9.0], [0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]
     rest = np.zeros(6 * 3 * 2 + N_SCALARS)

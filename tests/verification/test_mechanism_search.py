@@ -539,12 +539,16 @@ def test_largest_amount_is_least_on_a_kink():
 @pytest.mark.parametrize(
     ("before", "after", "taken"),
     [
-        ((5.0, 0.0), (4.0, 0.0), True), ((5.0, 0.0), (5.0, 0.0), False),
-        ((5.0, 0.0), (6.0, 0.0), False), ((5.0, 0.0), (4.0, 0.1), False),
-        ((5.0, 0.0), (6.0, 0.1), False), ((5.0, 0.2), (6.0, 0.1), True),
-        ((5.0, 0.2), (4.0, 0.3), False), ((5.0, 0.2), (6.0, 0.0), True),
+        ((5.0, 0.0), (4.0, 0.0), True),
+        ((5.0, 0.0), (5.0, 0.0), False),
+        ((5.0, 0.0), (6.0, 0.0), False),
+        ((5.0, 0.0), (4.0, 0.1), False),
+        ((5.0, 0.0), (6.0, 0.1), False),
+        ((5.0, 0.2), (6.0, 0.1), True),
+        ((5.0, 0.2), (4.0, 0.3), False),
+        ((5.0, 0.2), (6.0, 0.0), True),
     ],
-)  # fmt: skip
+)
 def test_a_round_is_kept_where_it_is_better_and_breaks_no_more(monkeypatch, before, after, taken):
     """Objective, and by how much limits are broken; else it is tried again with fewer steps."""
     tried = []

@@ -554,8 +554,12 @@ def test_steps_resolve_the_length_of_a_measured_flat(monkeypatch):
 
 
 def test_sections_rolled_the_other_way_have_the_same_radius_at_the_opposite_angle():
-    part = Sections(type="sections", angles=(-0.2, 0.1, 0.5), positions=(0.0, 0.01),
-                    heights=((1e-4, 2e-4), (3e-4, 4e-4), (5e-4, 6e-4)))  # fmt: skip
+    part = Sections(
+        type="sections",
+        angles=(-0.2, 0.1, 0.5),
+        positions=(0.0, 0.01),
+        heights=((1e-4, 2e-4), (3e-4, 4e-4), (5e-4, 6e-4)),
+    )
     back = part.backwards()
     radii = dict(zip(part.angles, part.heights, strict=True))
     assert back.angles == (-0.5, -0.1, 0.2)
