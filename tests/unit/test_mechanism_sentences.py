@@ -49,13 +49,13 @@ def test_positions_of_rest_are_told_in_degrees(monkeypatch):
 
 
 def test_arcs_of_a_cam_meet_with_their_gap_and_jump(monkeypatch):
-    """The rate changes from 0.5 to 0.51, by 2 %."""
+    """The rate changes from 0.5 to 0.51, by 1.961 % of the larger one."""
     found = said(
         monkeypatch,
         loaded=False,
         transitions=(Transition("cam", np.radians(15.0), 1, 2, 12.5e-6, 0.5, 0.51),),
     )
-    assert found == ["cam: from arc 1 to 2 at 15.0000 deg, gap 0.0125 mm, jump of the rate 2.000 %"]
+    assert found == ["cam: from arc 1 to 2 at 15.0000 deg, gap 0.0125 mm, jump of the rate 1.961 %"]
 
 
 @pytest.mark.parametrize(

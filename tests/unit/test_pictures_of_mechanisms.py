@@ -229,21 +229,21 @@ def test_the_rate_on_a_cam_is_drawn_arc_by_arc_and_beyond(monkeypatch, angle):
     cam = Cam.model_construct(cam="rocker.roller", arcs=arcs)
     q1 = np.zeros((4, 3, 3))
     q1[:, 1, 2] = [0.5, -0.5, 0.25, 0.25]
-    motion = Made(q1=q1, arcs=np.array([[7], [7], [8], [8]]))
+    still = np.zeros((1, 2))
+    motion = Made(q1=q1, arcs=np.array([[7], [7], [8], [8]]), point=lambda _: (still, still))
     asked = []
 
     def alone(given, row, arc, beyond):
         asked.append((given is motion, row, arc, beyond))
-        return None if arc == 8 else Made(s=S[:3], q1=np.full((3, 3, 3), -0.2))
+        return None if arc == 8 else Made(s=S[:3], q1=np.full((3, 3, 3), -0.2), point=motion.point)
 
     monkeypatch.setattr(plots, "cam_rows", lambda _: {"cam": 0})
-    monkeypatch.setattr(plots, "roller_body", lambda *_: 1)
     monkeypatch.setattr(plots, "on_one_arc", alone)
-    linkage = Made(joint=np.array([[0, 0, 0, 0, 7, 2]]))
+    linkage = Made(joint=np.array([[0, 0, 0, 0, 7, 2]]), point_body=np.array([0, 1]))
     result = made(
         motion=motion,
         angle=angle,
-        model=Made(axis=1, linkage=linkage),
+        model=Made(axis=1, linkage=linkage, points={cam.cam: 1}),
         travel=-0.5,
         definition={"joints": {"cam": cam}},
         transitions=(Made(travel=S[1]),),
