@@ -54,7 +54,7 @@ def test_arcs_of_a_rail_close_on_the_standards_head(name, half_width, depth):
     )
 
 
-@pytest.mark.parametrize(("inner", "outer"), pairwise(S1002_SECTIONS))
+@pytest.mark.parametrize(("inner", "outer"), list(pairwise(S1002_SECTIONS)))
 def test_sections_of_s1002_join_at_their_ends_in_height_and_slope(inner, outer):
     (end, one), (_, other) = S1002_SECTIONS[inner], S1002_SECTIONS[outer]
     y = end + 1e-4 * np.arange(-1, 2)
