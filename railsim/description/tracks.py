@@ -53,12 +53,14 @@ def describe_track(track: Track, speeds: Sequence[float | str]) -> Description:
         "irregularities": [_irregularity(part) for part in track.irregularities],
     }
     parts: Parts = [*_track_lines(track, data), "", _plan_table(data["plan"], speeds_si)]
-    if speeds_si and any("cant_deficiency" in row for row in data["plan"]):
+    if speeds_si and bends:
         parts.append("columns of speeds: cant deficiency in mm")
     ends = [Column("begin", "from", "m", "g"), Column("end", "to", "m", "g")]
     # the plan's table has the cant at the ends of its elements only
     ramps = {round(r[end], 6) for r in data["cant"] if r["type"] == "LIR" for end in ENDS}
     within = ramps - {round(r[end], 6) for r in data["plan"] for end in ENDS}
+    if within and bends:
+        parts.append("speeds and deficiencies of a curve: with the cant at its middle")
     for name, heading in (("cant", "cant (mm)"), ("vertical", "gradient per mille")):
         if not (within if name == "cant" else data[name]):
             continue
@@ -180,4 +182,4 @@ def _plan_table(plan: Sequence[dict[str, Any]], speeds: Sequence[float]) -> Tabl
 
 
 def _range(values: Sequence[float], scale: float) -> str:
-    return " to ".join(dict.fromkeys(f"{scale * value:g}" for value in values))
+    return " to ".join(dict.fromkeys(f"{round(scale * value, 2):g}" for value in values))

@@ -111,6 +111,18 @@ def test_cant_within_an_element_of_the_plan_is_shown(capsys):
     assert not any(line.startswith("LIR") for line in lines_of(capsys, "curve_r250"))
 
 
+def test_speeds_of_a_curve_in_which_a_cant_ramp_ends_are_told_with_the_cant_they_take(capsys):
+    # the ramp of 150 mm goes on for 30 m of the circle of 60 m: 100 mm at its begin
+    ramp = ["--set", "cant.1.length=90.0", "--set", "cant.2.length=30.0"]
+    lines = lines_of(capsys, "curve_r250", "--speed", "20", *ramp)
+    circle = next(line for line in lines if line.startswith("CIR"))
+    assert circle.split()[3:] == ["250", "100", "to", "150", "56.4", "79.7", "95"]
+    assert "speeds and deficiencies of a curve: with the cant at its middle" in lines
+    thirds = ["--set", "cant.1.length=70.0", "--set", "cant.2.length=50.0"]
+    lines = lines_of(capsys, "curve_r250", *thirds)
+    assert any("  0 to 128.57" in line for line in lines if line.startswith("CLO"))
+
+
 def test_irregularities_are_shown(capsys):
     option = 'irregularities=[{type="random", spectrum="erri_b176_low", seed=7}]'
     lines = lines_of(capsys, "straight", "--set", option)
