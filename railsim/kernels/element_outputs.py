@@ -7,6 +7,7 @@ stands in all eight lanes, and the first one is read.
 from railsim.kernels import compiled
 from railsim.kernels.element_columns import TRANSLATES, link_columns, mount_columns
 from railsim.kernels.elements import (
+    between,
     in_body_axes,
     link_tension,
     nonlinear_force,
@@ -82,10 +83,12 @@ def write_mount_output(system, work, internals, index, e, out):
         law = 0
         while law < mounts.law.shape[0] and mounts.law[law, 0] < index:
             law += 1
-        nonlinear, _ = nonlinear_force(system, work, (index, law, index + 1), d, rate, internals)
-        force = times(share[0], plus(spring_damper(spring, d, rate), nonlinear))
         d_2, rate_2 = in_body_axes(R2, omega_2, g, w)
-        force_2 = times(share[1], spring_damper(spring, d_2, rate_2))  # of a shear spring half
+        mean, mean_rate = between(d, d_2, share[1]), between(rate, rate_2, share[1])
+        block = index, law, index + 1
+        nonlinear, _ = nonlinear_force(system, work, block, mean, mean_rate, internals)
+        force = times(share[0], plus(spring_damper(spring, d, rate), nonlinear))
+        force_2 = times(share[1], plus(spring_damper(spring, d_2, rate_2), nonlinear))
         store_vector(out, e, DEFLECTION, laws, d)
         store_vector(out, e, FORCE, laws, plus(force, rotate_back(R1, rotate(R2, force_2))))
         store_vector(out, e, RATE, laws, rate)

@@ -308,6 +308,15 @@ def in_body_axes(R, omega, g, w):
 
 
 @compiled(inline=True)
+def between(d_1, d_2, share):
+    """Deflection of an internal state: d_1 + share (d_2 - d_1), the mean of both ends' axes.
+
+    F(d) halves along both ends' axes is then the gradient of its potential; share 0 gives d_1.
+    """
+    return plus(d_1, times(share, minus(d_2, d_1)))
+
+
+@compiled(inline=True)
 def spring_damper(law, d, rate):
     """F_0 + K d + C d', axis by axis."""
     stiffness, damping, preload = law
@@ -384,9 +393,9 @@ def update_friction_limits(system, work):
 def add_mount_forces(system, work, internals):
     """Add the forces of all three-axis elements to the bodies' rows in `pose`.
 
-    The force acts in the axes of body 1, of a shear spring half of it in those of body 2.  The
-    gradient of the potential puts the moment g x f on the body whose axes they are, besides the
-    forces +-f at the points.  ``internals``: internal states.
+    The force acts in the axes of body 1, of shear and air springs half of it in those of body 2.
+    The gradient of the potential puts the moment g x f on the body whose axes they are, besides
+    the forces +-f at the points.  ``internals``: internal states.
     """
     mounts, pose = system.mounts, work.pose
     count = mounts.body.shape[0]
@@ -402,16 +411,19 @@ def add_mount_forces(system, work, internals):
         point_1, point_2, share, spring, rotation = mount_columns(mounts.row, lanes)
         R1, R2, omega_1, omega_2, a, b, g, w = relative_motion(pose, b1, b2, point_1, point_2)
         d, rate = in_body_axes(R1, omega_1, g, w)
-        t = spring_damper(spring, d, rate)
+        t, t_2 = spring_damper(spring, d, rate), (splat(0.0), splat(0.0), splat(0.0))
+        if both_ends:
+            d_2, rate_2 = in_body_axes(R2, omega_2, g, w)
+            t_2 = spring_damper(spring, d_2, rate_2)
+            d, rate = between(d, d_2, share[1]), between(rate, rate_2, share[1])
         if law < mounts.law.shape[0] and mounts.law[law, 0] < first + n:
             forces, law = nonlinear_force(system, work, (first, law, first + n), d, rate, internals)
-            t = plus(t, forces)
+            t, t_2 = plus(t, forces), plus(t_2, forces)
         f = rotate(R1, times(share[0], t))
         moment_1 = cross(g, f)
         moment_2 = splat(0.0), splat(0.0), splat(0.0)
         if both_ends:
-            d, rate = in_body_axes(R2, omega_2, g, w)
-            f_2 = rotate(R2, times(share[1], spring_damper(spring, d, rate)))
+            f_2 = rotate(R2, times(share[1], t_2))
             moment_2 = cross(g, f_2)
             f = plus(f, f_2)
         if rotates:

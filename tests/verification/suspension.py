@@ -10,6 +10,7 @@ import numpy as np
 GRAVITY = 9.81
 STEP = 1e-30  # of the complex step, m and rad
 DIFFERENCE = 1e-5  # m and rad
+STANDING = ("shear_spring", "airspring")  # in the middle between both bodies, in the axes of both
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
@@ -74,7 +75,7 @@ class Element:
         given = table.get("preload")
         self.load = given if isinstance(given, float) else 0.0  # vertical preload [N]
         points = table["at"]
-        if self.kind == "shear_spring":
+        if self.kind in STANDING:
             points = np.mean(points, axis=0, keepdims=True)
         self.points = points if self.kind == "spring_damper" else points[[-1, -1]]
 
@@ -92,7 +93,7 @@ class Element:
         if self.kind == "spring_damper":
             nominal = np.linalg.norm(self.points[1] - self.points[0])
             return [np.sqrt(np.sum(gap**2, axis=-1))[..., None] - nominal], R
-        axes = (R1, R2) if self.kind == "shear_spring" else (R1,)
+        axes = (R1, R2) if self.kind in STANDING else (R1,)
         return [np.einsum("...ji,...j", frame, gap) for frame in axes], R
 
     def stiffnesses(self):

@@ -203,7 +203,7 @@ class Airspring(base.PreloadAlongAxes, base.PointElement):
         return self.area_stiffness + in_series / (self.bellows_stiffness + self.reservoir_stiffness)
 
     def rows(self) -> list[Mount]:
-        """One mount whose vertical force has the state of the reservoir."""
+        """One mount in the middle, its vertical force with the state of the reservoir."""
         air = (self.bellows_stiffness, self.reservoir_stiffness, self.orifice_damping)
         return [
             Mount(
@@ -212,6 +212,7 @@ class Airspring(base.PreloadAlongAxes, base.PointElement):
                 states=(None, None, State("air", air)),
                 rotation=(0.0, 0.0, self.torsional_stiffness),
                 preload=self.known_preload,
+                both_ends=True,
             )
         ]
 
