@@ -22,6 +22,7 @@ from railsim.assessment import signals as signal
 from railsim.assessment.sections import TestSection
 from railsim.assessment.signals import Band, Signal, Signals
 from railsim.definitions.vehicle.flatten import flatten
+from railsim.notation import DECIMALS
 from railsim.result.filters import distance_means, window_centres
 from railsim.table import beside
 
@@ -214,7 +215,12 @@ class Criterion:
         """Value in the unit of tables, see `beside`; a hyphen where there is none."""
         if math.isnan(value):
             return "-"
-        return beside(self.scale * value, self.scale * limit, 3 if self.scale == 1.0 else 2)
+        return beside(self.scale * value, self.scale * limit, self.decimals)
+
+    @property
+    def decimals(self) -> int:
+        """Decimals in tables."""
+        return DECIMALS.get(self.unit, 3)
 
 
 BOTH = ("normal", "simplified")

@@ -68,7 +68,7 @@ def transition_table(assessment: Assessment) -> Table:
 def _row(row: Assessed) -> list[object]:
     c, estimate = row.criterion, row.estimate
     limited = row.limit == row.limit
-    column = Column(c.name, unit=c.unit, format=".3f" if c.scale == 1.0 else ".2f")
+    column = Column(c.name, unit=c.unit, format=f".{c.decimals}f")
     limit = row.limit if limited else None
     value: object = Amount(estimate.value, column, limit=limit)
     if row.uncorrected is not None:

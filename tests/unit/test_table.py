@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from railsim.assessment.criteria import CRITERIA
 from railsim.design_checks import Check, check_table
 from railsim.notation import QUANTITIES, REQUESTED, SHOWN_UNITS
 from railsim.table import Amount, Column, Table, _fold
@@ -153,6 +154,10 @@ def test_units_of_the_quantities_are_those_of_tables():
             assert column.text(1.0) == quantity.text(1.0)
             assert column.si_unit in (quantity.unit, "" if quantity.unit == "1" else None)
     assert all(scale > 0.0 for _, scale in SHOWN_UNITS.values())
+
+
+def test_assessed_wear_numbers_have_the_decimals_of_peaks():
+    assert CRITERIA["T_qst"].text(73.536) == QUANTITIES["T_gamma"].text(73.536)
 
 
 def test_names_are_broken_at_their_dots_and_numbers_nowhere():
