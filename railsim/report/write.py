@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from railsim.assessment.assessment import Assessment
-from railsim.errors import listed
+from railsim.errors import argument_error, listed
 from railsim.files.access import check_file, folder_of, write_text
 from railsim.report.measured import as_section, is_measured, measured_page, read_part
 from railsim.report.runs import page
@@ -16,7 +16,7 @@ ENDINGS = (".html", ".htm")
 
 
 def write_report(
-    files: Sequence[str | Path],
+    files: str | Path | Sequence[str | Path],
     path: str | Path,
     *,
     title: str = "",
@@ -28,7 +28,7 @@ def write_report(
 
     Parameters
     ----------
-    files : sequence of str or Path
+    files : str or Path, or a sequence of them
         Result files; folders of studies, and those that `validate_model`, `identify` or studies of
         wear have written.
     path : str or Path
@@ -50,14 +50,18 @@ def write_report(
     Raises
     ------
     InputError
-        Something cannot be read or is given twice; the page exists or cannot be written.
+        Nothing is given; something cannot be read or is given twice; the page exists or cannot be
+        written.
 
     Examples
     --------
     >>> import railsim
-    >>> railsim.write_report(["curves"], "curves.html")  # doctest: +SKIP
+    >>> railsim.write_report("curves", "curves.html")  # doctest: +SKIP
     """
-    target, names = Path(path), [str(file) for file in files]
+    target = Path(path)
+    names = [str(file) for file in ([files] if isinstance(files, str | Path) else files)]
+    if not names:
+        raise argument_error("files", "none", "a result file or a folder at least")
     check_file(target, overwrite=overwrite, endings=ENDINGS)
     parts = [read_part(name) for name in names if is_measured(name)]
     names = [name for name in names if not is_measured(name)]

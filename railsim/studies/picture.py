@@ -18,6 +18,7 @@ from railsim.text import unformatted
 
 Text = str | None
 WITH_VALUES = ("complete", "derailed", "stopped")
+KINDS = ("curves", "map", "ranking")
 
 
 def study_figure(
@@ -45,7 +46,7 @@ def study_figure(
     if not by_key:
         raise input_error(str(file), "no run has values", "a study with finished runs")
     names, varied = _names(quantities, by_key), _varied(file, gathered, records)
-    _check(names, by_key, {"against": against, "family": family}, varied)
+    _check(names, by_key, {"against": against, "family": family}, varied, kind)
     ordered = sorted(varied, key=lambda name: _use(name, varied[name]))
     x = against or next((name for name in ordered if name != family), None)
     if kind is None:
@@ -82,8 +83,9 @@ def _check(
     by_key: Collection[str],
     parameters_of: Mapping[str, Text],
     varied: Collection[str],
+    kind: Text,
 ) -> None:
-    """Refuse values that the study does not have, and parameters that were not varied."""
+    """Refuse values that the study does not have, what was not varied, axes twice, other kinds."""
     faults = Faults()
     for name in names:
         if name not in by_key:
@@ -93,6 +95,9 @@ def _check(
         if key and key not in varied:
             words = f"'{key}' was not varied"
             faults.append(argument_fault(argument, "", words, nearest(key, varied)))
+    key, family = parameters_of.values()
+    faults.require(not key or key != family, "family", f"'{key}' as `against`", "another parameter")
+    faults.require(kind in (None, *KINDS), "kind", f"found {kind!r}", nearest(str(kind), KINDS))
     faults.check()
 
 

@@ -123,6 +123,7 @@ def test_words_and_seeds_are_axes_if_asked_for(chosen, across, tmp_path, monkeyp
         (["Y_over_Q_ab"], "did you mean 'Y_over_Q_abs'"),
         (["Y_over_P_peak"], "QUANTITY: Y_over_P_peak: no such value"),
         (["--against", "fricton"], "'fricton' was not varied; did you mean 'track.friction'"),
+        (["--against", "speed", "--family", "speed"], "--family: 'speed' as --against"),
     ],
 )
 def test_what_the_study_lacks_is_refused(folder, capsys, chosen, words):
@@ -144,11 +145,15 @@ def test_python_draws_and_reports_what_the_command_does(folder, tmp_path, capsys
     assert (texts, path.exists()) == (["10", "12"], True)
     with pytest.raises(railsim.InputError, match="against: 'friction' was not varied"):
         outcome.plot(against="friction")
-    page = railsim.write_report([folder], tmp_path / "python.html")
+    with pytest.raises(railsim.InputError, match="'pie'; allowed: curves, map, ranking"):
+        outcome.plot(kind="pie")
+    page = railsim.write_report(folder, tmp_path / "python.html")
     assert main(["report", str(folder), "--out", str(tmp_path / "command.html")]) == 0
     assert page.read_text() == (tmp_path / "command.html").read_text()
     with pytest.raises(railsim.InputError, match="exists"):
         railsim.write_report([folder], page)
+    with pytest.raises(railsim.InputError, match="files: none; a result file or a folder"):
+        railsim.write_report([], tmp_path / "empty.html")
     with pytest.raises(railsim.InputError, match="no results in this folder"):
         railsim.open_study(tmp_path / "none")
 
