@@ -9,7 +9,7 @@ from railsim.cli import common as cli
 @click.argument("files", nargs=-1, required=True, metavar="DIR_OR_FILES...")
 @cli.option("--out", "Page.", "F.html", default="report.html")
 @cli.option("--title", "Title; by default the names of what is reported.", "TEXT")
-@cli.option("--curves", "Runs with curves, largest first.", "N", click.IntRange(1, 16), default=8)
+@cli.option("--curves", "Runs with curves, largest first, 16 at most.", "N", int, default=8)
 @cli.output_options()
 def command(files: tuple[str, ...], title: str, curves: int, output: cli.Output) -> None:
     """Write one self-contained page about results, studies, comparisons with tests.

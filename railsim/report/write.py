@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from railsim.assessment.assessment import Assessment
-from railsim.errors import argument_error, listed
+from railsim.errors import Faults, listed
 from railsim.files.access import check_file, folder_of, write_text
 from railsim.report.measured import as_section, is_measured, measured_page, read_part
 from railsim.report.runs import page
@@ -13,6 +13,7 @@ from railsim.studies.gathered import gather
 from railsim.studies.inputs import used_inputs
 
 ENDINGS = (".html", ".htm")
+MOST_CURVES = 16  # runs whose curves a page can tell apart
 
 
 def write_report(
@@ -36,7 +37,7 @@ def write_report(
     title : str
         By default the names of what is reported.
     curves : int
-        Largest number of runs whose curves are shown, those with the largest values.
+        Largest number of runs whose curves are shown, those with the largest values; 1 to 16.
     assessments : sequence of Assessment
         Assessments of the runs, shown with their limits.
     overwrite : bool
@@ -50,8 +51,8 @@ def write_report(
     Raises
     ------
     InputError
-        Nothing is given; something cannot be read or is given twice; the page exists or cannot be
-        written.
+        Nothing is given; something cannot be read or is given twice; a number of curves that cannot
+        be shown; the page exists or cannot be written.
 
     Examples
     --------
@@ -60,8 +61,10 @@ def write_report(
     """
     target = Path(path)
     names = [str(file) for file in ([files] if isinstance(files, str | Path) else files)]
-    if not names:
-        raise argument_error("files", "none", "a result file or a folder at least")
+    faults = Faults()
+    faults.require(names, "files", "none", "a result file or a folder at least")
+    faults.require(1 <= curves <= MOST_CURVES, "curves", f"found {curves}", f"1 to {MOST_CURVES}")
+    faults.check()
     check_file(target, overwrite=overwrite, endings=ENDINGS)
     parts = [read_part(name) for name in names if is_measured(name)]
     names = [name for name in names if not is_measured(name)]
