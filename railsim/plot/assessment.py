@@ -178,11 +178,10 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
                     colour = distinct(names.index(report.population.name))
                     _regression(ax, report, rows[zone], colour)
             row = rows[zone]
-            ax.axhline(row.criterion.scale * row.limit, color=LIMIT, lw=1.0)
             unit = row.criterion.unit.replace("-", "1")
             ax.set_ylabel(f"{row.criterion.words},\n{row.place} ({unit})", fontsize=8)
     looks: dict[str, Any] = {"regression": {}, "upper bound": {"ls": "--"}}
-    looks |= {"estimate": {"marker": "D", "ls": ""}, "limit": {"color": LIMIT}}
+    looks |= {"estimate": {"marker": "D", "ls": ""}, "limit": {"color": LIMIT, "marker": "<"}}
     handles = [key(words, **{"color": "0.25"} | look) for words, look in looks.items()]
     if any(names):
         handles += [key(name, marker="o", ls="", color=distinct(k)) for k, name in enumerate(names)]
@@ -200,15 +199,20 @@ def _widest(assessment: Assessment, zone: str) -> Assessed | None:
 
 
 def _regression(ax: Axes, report: ZoneReport, like: Assessed, colour: str) -> None:
-    """Draw the values of one quantity at one place in one population."""
+    """Draw the values of one quantity at one place in one population, and its limit."""
     own, scale = (like.criterion.name, like.place), like.criterion.scale
     sections = [v for v in report.values if own in v.values]
     points = [(1e3 * v.section.cant_deficiency, scale * max(v.values[own])) for v in sections]
     if points:
         ax.plot(*zip(*points, strict=True), "o", color=colour, ms=3.5)
     row = next((r for r in report.rows if (r.criterion.name, r.place) == own), None)
-    line = row.estimate.line if row else None
-    if line is None or row is None:
+    if row is None:
+        return
+    ax.axhline(scale * row.limit, color=LIMIT, lw=1.0)  # of its own static loads
+    edge: Any = {"transform": ax.get_yaxis_transform(), "clip_on": False}
+    ax.plot(1.0, scale * row.limit, "<", color=colour, ms=5, **edge)
+    line = row.estimate.line
+    if line is None:
         return
     places = [1e3 * line.target, *(deficiency for deficiency, _ in points)]
     x = np.linspace(min(places), max(places), 60)

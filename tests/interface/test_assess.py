@@ -29,7 +29,7 @@ from railsim.definitions.study.analyses import AssessAnalysis, unit_of_number
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import InputError
 from railsim.notation import PATCHES, REQUESTED
-from railsim.plot.assessment import assessment_figure, sections_figure
+from railsim.plot.assessment import assessment_figure, regression_figure, sections_figure
 from railsim.profiles import load_profile
 from railsim.result import Result
 from railsim.studies.analyses import numbers_and_remarks
@@ -388,6 +388,21 @@ def test_more_cant_deficiency_takes_the_two_dimensional_method():
     assert row.estimate.value == pytest.approx(1e3, rel=1e-6)
     # the straights between them are too short for a section: told, and no zone
     assert any("a section needs" in note for z in found.zones for note in z.notes)
+
+
+def test_regression_shows_the_limit_of_each_population():
+    """90 kN + Q0 of two static loads; one of them alone stood over the values of both."""
+    plan = [e for r in (290.0, 330.0) for e in curve(r, 250.0, run=50.0)]
+
+    def run(friction, load):
+        on = track(*plan, cant=0.12).replace(friction=friction)
+        whole = made(on, 23.0, Y=lambda t, s: both_sides(-1e3 + 0.0 * s))
+        arrays = {n: whole[n] for n in whole} | {"Q0": np.full((4, 2), load)}
+        return Result(arrays, whole.quantities, whole.coordinates, whole.attributes, whole.profiles)
+
+    figure = regression_figure(assess({"light": run(0.4, 30e3), "heavy": run(0.5, 60e3)}))
+    flat = [line for line in figure.axes[0].lines if list(line.get_xdata()) == [0, 1]]
+    assert sorted(line.get_ydata()[0] for line in flat) == pytest.approx([120.0, 150.0])
 
 
 def test_derailed_run_is_no_pass():
