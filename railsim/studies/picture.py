@@ -97,6 +97,8 @@ def _check(
             faults.append(argument_fault(argument, "", words, nearest(key, varied)))
     key, family = parameters_of.values()
     faults.require(not key or key != family, "family", f"'{key}' as `against`", "another parameter")
+    alone = kind != "ranking" or not (key or family)
+    faults.require(alone, "kind", "'ranking' with `against` or `family`", "without them")
     faults.require(kind in (None, *KINDS), "kind", f"found {kind!r}", nearest(str(kind), KINDS))
     faults.check()
 

@@ -124,6 +124,7 @@ def test_words_and_seeds_are_axes_if_asked_for(chosen, across, tmp_path, monkeyp
         (["Y_over_P_peak"], "QUANTITY: Y_over_P_peak: no such value"),
         (["--against", "fricton"], "'fricton' was not varied; did you mean 'track.friction'"),
         (["--against", "speed", "--family", "speed"], "--family: 'speed' as --against"),
+        (["--kind", "ranking", "--family", "speed"], "--kind: 'ranking' with --against"),
     ],
 )
 def test_what_the_study_lacks_is_refused(folder, capsys, chosen, words):
