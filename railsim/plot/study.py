@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from railsim.arrays import Flags, Floats, largest_first
+from railsim.description.values import short
 from railsim.plot.style import DISTINCT, LIMIT, Picture, grid_of, note, styled
 from railsim.text import unformatted
 
@@ -130,7 +131,7 @@ def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, memb
     order = sorted(groups)
     at = [different[k] if x.numeric else k for k in order]
     middle = [float(np.median(groups[k])) for k in order]
-    label = None if member is None else unformatted(_text(member))
+    label = None if member is None else unformatted(short(member))
     line = "-" if x.numeric else ""  # categories have no order
     axes.plot(at, middle, "o", ls=line, color=colour, ms=3.5, label=label)
     if max(map(len, groups.values())) > 1:
@@ -194,7 +195,7 @@ def _draw_map(figure: Figure, axes: Axes, values: Any, quantity: Column) -> None
 def _ticks(tell: Any, values: Sequence[Any]) -> None:
     step = -(-len(values) // 8)
     indices = range(0, len(values), step)
-    tell(list(indices), [unformatted(_text(values[index])) for index in indices])
+    tell(list(indices), [unformatted(short(values[index])) for index in indices])
 
 
 def _turn_labels(axes: Axes) -> None:
@@ -225,10 +226,6 @@ def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure
         more = f", the largest {len(shown)} of {len(order)}" if left_out else ""
         axes.set_title(quantity.words + more)
     return figure
-
-
-def _text(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _panels(count: int) -> tuple[Picture, list[Axes]]:

@@ -224,6 +224,9 @@ def test_curves_and_bands_hold_the_values():
     figure = curves_figure([VALUES], SPEED, VEHICLE, [False, True, False, False, True])
     (cross,) = [line for line in figure.axes[0].get_lines() if line.get_marker() == "x"]
     assert cross.get_xydata().tolist() == [[20.0, 2.0]]  # the last of them has no value
+    stiff = Column("k (N/m)", [31.391e6, 31.391e6, 8e6, 8e6, 8e6])
+    texts = curves_figure([VALUES], SPEED, stiff).legends[0].get_texts()
+    assert [text.get_text() for text in texts] == ["8e6", "31.391e6"]
     figure = curves_figure([VALUES], VEHICLE, None)
     assert [t.get_text() for t in figure.axes[0].get_xticklabels()] == ["a", "b"]
 
