@@ -110,8 +110,10 @@ def _rail_rows(track: Track, s: Floats) -> Iterator[_Row]:
     if track.irregularities:
         across, down = {"left": y_left, "right": y_right}, {"left": z_left, "right": z_right}
         words = "displacement of the rails, positive"
-        yield f"Lateral {words} to the right{without}", "$y$ (mm)", across
-        yield f"Vertical {words} downwards{without}", "$z$ (mm)", down
+        if without or np.ptp([y_left, y_right]) > 0.0:
+            yield f"Lateral {words} to the right{without}", "$y$ (mm)", across
+        if without or np.ptp([z_left, z_right]) > 0.0:
+            yield f"Vertical {words} downwards{without}", "$z$ (mm)", down
     if np.ptp(gauge) > 1e-6:
         yield "Gauge", "(mm)", {"gauge": gauge}
 

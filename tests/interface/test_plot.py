@@ -448,6 +448,16 @@ def test_track_figure_shows_everything_that_changes_along_the_track():
     ]
     gauge = figure.axes[6].lines[0].get_ydata()
     assert (gauge.min(), gauge.max()) == pytest.approx((1435.0, 1450.0))
+    kink = {
+        "type": "kink",
+        "s": 80.0,
+        "length": 10.0,
+        "offset": 0.008,
+    }  # not vertical: no flat axes
+    titles = [
+        a.get_title(loc="left") for a in track_figure(track.replace(irregularities=[kink])).axes
+    ]
+    assert not any(title.startswith("Vertical") for title in titles)
     words = figure.get_supxlabel()
     assert "s = 360 m: a cant of 150 mm is more than (R - 100 m)/2 = 75 mm" in words
 
