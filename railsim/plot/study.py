@@ -49,14 +49,18 @@ class Column:
         return sorted(present, key=lambda value: (isinstance(value, str), value))
 
     @property
+    def least(self) -> float:
+        """Last digit of printed tables; 0 where they have no fixed number of digits."""
+        return 0.0 if self.decimals is None else 0.1**self.decimals
+
+    @property
     def limits(self) -> tuple[float, float] | None:
         """Limits of an axis where the values differ by less than the digits of tables show."""
         present = [value for value in self.values if value is not None]
-        least = 0.0 if self.decimals is None else 0.1**self.decimals
-        if not present or max(present) - min(present) >= 2.0 * least:
+        if not present or max(present) - min(present) >= 2.0 * self.least:
             return None
         middle = 0.5 * (min(present) + max(present))
-        return middle - least, middle + least
+        return middle - self.least, middle + self.least
 
     def text(self, value: float, digits: int) -> str:
         """Return a number with so many digits, none beyond those of tables: 1570, 38.0, 0.00."""
@@ -221,6 +225,8 @@ def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure
         axes.bar_label(bars, [quantity.text(value, 4) for value, _ in shown], padding=3, fontsize=7)
         axes.invert_yaxis()
         axes.margins(x=0.1, y=0.02)
+        if max(map(abs, lengths), default=0.0) < quantity.least:
+            axes.set_xlim(-quantity.least, quantity.least)
         axes.tick_params(axis="y", labelsize=7)
         left_out = len(order) - len(shown)
         more = f", the largest {len(shown)} of {len(order)}" if left_out else ""

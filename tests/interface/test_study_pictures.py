@@ -276,7 +276,8 @@ def test_rounding_errors_are_no_colours_and_no_curves():
     drawn = [map_figure([one], SPEED, VEHICLE).axes[0].get_images()[0] for one in (noise, shown)]
     assert [image.get_clim() for image in drawn] == [pytest.approx((-0.01, 0.01)), (0.0, 0.03)]
     limits = curves_figure([noise], SPEED, VEHICLE).axes[0].get_ylim()
-    assert limits == pytest.approx((-0.01, 0.01))
+    bars = ranking_figure([noise], ["p", "q", "r", "s", "t"]).axes[0].get_xlim()
+    assert [limits, bars] == [pytest.approx((-0.01, 0.01))] * 2
 
 
 def test_pictures_name_the_medians_of_runs_that_share_a_point():

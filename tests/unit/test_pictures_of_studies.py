@@ -91,14 +91,16 @@ def test_a_regression_is_drawn_over_the_deficiency_in_the_unit_of_its_quantity()
     """Y = 20 kN + 200 kN/m x; the bound is q s sqrt(1 + 1/N + (x - m)^2/S) above it."""
     line = Line(20e3, 200e3, 1e3, 0.15, 2.0, 4, 0.1, 0.01)
     criterion = Made(name="Y", scale=1e-3)
-    like = Made(criterion=criterion, place="axle 1", estimate=Made(line=line, value=53e3))
+    estimated = {"estimate": Made(line=line, value=53e3), "limit": 60e3}
+    like = Made(criterion=criterion, place="axle 1", **estimated)
     other = Made(criterion=Made(name="Q"), place="axle 1", estimate=Made(line=None))
     section = {"section": Made(cant_deficiency=0.05), "values": {("Y", "axle 1"): [25e3, 31e3]}}
     elsewhere = {"section": Made(cant_deficiency=0.3), "values": {("Y", "axle 2"): [1.0]}}
     report = Made(values=[Made(**section), Made(**elsewhere)], rows=[other, like])
     axes = plt.figure().subplots()
     assessment._regression(axes, report, like, "C0")
-    values, mean, bound, estimate = points(axes)
+    values, limit, mark, mean, bound, estimate = points(axes)
+    assert (limit[:, 1].tolist(), mark.tolist()) == ([60.0, 60.0], [[1.0, 60.0]])
     assert values == pytest.approx(np.array([[50.0, 31.0]]))
     x = np.linspace(0.05, 0.15, 60)
     assert mean == pytest.approx(np.stack((1e3 * x, 20.0 + 200.0 * x), axis=1))
