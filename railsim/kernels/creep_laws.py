@@ -184,9 +184,10 @@ def _fastrip_strips(n, nx, ny, patches, G, work):
     """Prepare the strips of all patches for `_fastrip_cell`.
 
     Rows of work: 0 to 2 growth per cell of the direction's traction (x and y at the middle, y by
-    spin times x/l); 3 end of the slip zone, x/l; 4, 5 state of the direction's traction, 6 whether
-    it is at its bound; 7 to 9 sums of p_x, p_y, x p_y, which begin with those of the stick zone;
-    10 integral of the ellipse over the slipping part of the cell that the stick zone cuts.
+    spin times x/l); 3 end of the slip zone, x/l; 4, 5 state of the direction's traction, 6 how far
+    it counts as at its bound, 0 to 1; 7 to 9 sums of p_x, p_y, x p_y, which begin with those of the
+    stick zone; 10 integral of the ellipse over the slipping part of the cell that the stick zone
+    cuts.
     """
     a, b, mu_N = patches.a, patches.b, patches.mu_N
     c11, c22, c23 = patches.c11, patches.c22, patches.c23
@@ -239,11 +240,13 @@ def _fastrip_strips(n, nx, ny, patches, G, work):
             divisor = math.sqrt(max(inside, 0.0)) - v * psi
             sticks = inside >= 0.0 and divisor * l > square and square > 0.0
             d = square / divisor if sticks else l
+            # no jump where beyond the limit of spin the last root vanishes
+            d += (1.0 - min(1.0, max(inside, 0.0) / (0.5 * v * v + _TINY))) * (l - d)
             stick_x, stick_y, stick_m = _stick_zone(u / d, v / d, psi, d / l)
             work[3, c] = 2.0 * d / l - 1.0
             work[4, c] = 0.0
             work[5, c] = 0.0
-            work[6, c] = 1.0 if sticks else 0.0
+            work[6, c] = min(1.0, 5.0 * (1.0 - d / l))  # no jump where the strip begins to stick
             work[7, c] = stick_x
             work[8, c] = stick_y
             work[9, c] = stick_m
@@ -302,17 +305,20 @@ def _fastrip_cell(m, x_front, x_rear, x_slip, step, ellipse, work):
     sum_x, sum_y, sum_m, partial = work[7], work[8], work[9], work[10]
     x_cell = 0.5 * (x_front + x_rear)
     parabola = 1.0 - x_cell * x_cell
+    full = 1.0 / parabola
     for c in range(m):
         gx = grow_x[c]
         gy = grow_y[c] + x_slip * grow_s[c]
-        mode = at_bound[c]
-        # a traction that opposes the slip turns round through stick
-        mode = 0.0 if fx[c] * gx + fy[c] * gy < 0.0 else mode
         x = fx[c] + step * gx
         y = fy[c] + step * gy
-        size = math.sqrt(x * x + y * y + _TINY)
-        cut = min(1.0, parabola / size)
-        mode = 1.0 if size > parabola else mode
+        square = x * x + y * y + _TINY
+        inverse = 1.0 / math.sqrt(square)
+        cut = min(1.0, parabola * inverse)
+        # a traction that opposes the slip turns round through stick
+        before = fx[c] * fx[c] + fy[c] * fy[c] + _TINY
+        left = min(1.0, square / before)
+        mode = max(at_bound[c] * left * left, _TINY)
+        mode = 1.0 if cut < 1.0 else mode
         x *= cut
         y *= cut
         fx[c] = x
@@ -320,7 +326,7 @@ def _fastrip_cell(m, x_front, x_rear, x_slip, step, ellipse, work):
         at_bound[c] = mode
         end = slip_end[c]
         slides = ellipse if end >= x_front else (partial[c] if end > x_rear else 0.0)
-        factor = slides / (size * cut) if mode > 0.5 else slides / parabola
+        factor = slides * (mode * max(inverse, full) + (1.0 - mode) * full)
         sum_x[c] += factor * x
         sum_y[c] += factor * y
         sum_m[c] += factor * y * x_cell
@@ -336,9 +342,10 @@ def fastrip(n, nx, ny, patches, G, work):
     direction that of FASTSIM with the parabolic bound.  Ours differs from the published algorithm:
     (1) FASTSIM's three flexibilities go over to one when the creepage is large, so that full
     sliding has the direction of the slip; (2) the stick zone is kept for spin beyond the limit of
-    strip theory where lateral creepage opposes it; (3) a direction that reverses passes through
-    smaller tractions.  Three numbers of the blend were fitted to CONTACT's results for
-    a/b = 0.3, 1 and 3.
+    strip theory where lateral creepage opposes it, and shrinks to nothing where its end has no
+    solution; (3) a direction that reverses passes through smaller tractions.  The force is
+    continuous in the creepages, with any number of cells.  Three numbers of the blend were fitted
+    to CONTACT's results for a/b = 0.3, 1 and 3.
 
     Parameters as in `railsim.kernels.fastsim.fastsim`.
 

@@ -224,3 +224,20 @@ def test_kalkers_printed_coefficients_run_smoothly_over_the_axis_ratio(nu):
                 assert y[i] == pytest.approx(cubic(x[i]), abs=0.1 if i in (0, 9) else 0.01)
         if nu == 0.0:
             np.testing.assert_allclose(half[0], half[1], rtol=1e-12)
+
+
+@laws
+@pytest.mark.parametrize("ratio", [0.3, 1.0, 3.0])
+def test_no_force_jumps_nor_is_steeper_than_linear_theory_twice(law, ratio):
+    random, size, points = np.random.default_rng(0), 6e-3, 400
+    a, b = size * np.sqrt(ratio), size / np.sqrt(ratio)
+    c = np.max([np.max(part) for part in kalker_coefficients(ratio, 0.28)[:3]])
+    begin, way = random.normal(size=(2, 3, 40, 1))
+    begin *= random.uniform(2e-4, 5e-3, (40, 1)) / np.linalg.norm(begin, axis=0)
+    way /= np.linalg.norm(way, axis=0)
+    step = 5e-8  # of slip by creepage and spin
+    x, y, spin = begin + way * step * np.arange(points)
+    for cells in (10, 50) if CREEP_LAWS[law].grid else (10,):
+        force = creep_force(a, b, N, MU, x, y, spin / size, G, law=law, nx=cells, ny=cells)
+        change = np.hypot(np.diff(force.T_x), np.diff(force.T_y))
+        assert np.max(change) < 2.0 * G * a * b * c * step
