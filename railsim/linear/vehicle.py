@@ -195,23 +195,22 @@ class LinearVehicle:
 
     def steady(self, speed: float) -> Floats:
         """Return the state of steady rolling at a speed [m/s]; raises ModelError: there is none."""
-        solver = SteadyRolling(self.model, self.system, held=self.held)
         if speed not in self._known and self._known:
             near = min(self._known, key=lambda v: abs(v - speed))
+            solver = SteadyRolling(self.model, self.system)
             with suppress(ModelError):  # too far from the known one: led there from straight track
                 self._known[speed] = solver.solve(self._known[near], speed)
         if speed not in self._known:
-            straight = not self.curvature and not self.cant
-            self._known[speed] = solver.solve(self._rest, speed) if straight else self._led(speed)
+            self._known[speed] = self._led(speed)
         return self._known[speed]
 
     def _led(self, speed: float) -> Floats:
-        """The same, led there from straight track."""
+        """The same, led there from rolling at walking pace on straight track."""
 
         def along(share: float) -> tuple[System, float]:
             bend, cant = share * self.curvature, share * self.cant
             part = circle(self.track, curvature=bend, cant=cant, at=self.at)
-            system = self.model.system._replace(track=track_tables(part))
+            system = self.system._replace(track=track_tables(part))
             return system, WALKING_PACE + math.sqrt(share) * (speed - WALKING_PACE)
 
         return follow(self.model, along, self._rest)[0]
