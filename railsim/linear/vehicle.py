@@ -38,6 +38,11 @@ STICKING = (
     "they are linearised with their elasticity in sticking, and what they damp in sliding is left "
     "out"
 )
+# what a remark says of a law that has no derivative at zero creepage
+DIRECTED = (
+    "Polach's creep force has no tangent at zero creepage: its slope goes from c11 to c22 with the "
+    "direction of the creepage, so that small oscillations of a run have another damping"
+)
 CELLS = 100  # along and across a patch, from which on the slopes of the creep force have no steps
 
 
@@ -167,6 +172,8 @@ class LinearVehicle:
         self.sticking = int(np.count_nonzero(self.model.system.internal.kind == PAD))
         if self.sticking:
             self.remarks += (f"{self.sticking} friction elements stick: {STICKING}",)
+        if rolling.creep_law == "polach":
+            self.remarks += (DIRECTED,)
         kinds = zip(self.model.index.bodies, self.model.system.bodies.kind, strict=True)
         rigid = [name for name, kind in kinds if kind in (RIGID, FIXED)]
         if wrong := [name for name in hold if name not in rigid]:

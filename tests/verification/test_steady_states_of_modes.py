@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from dynamics import load_track, load_vehicle
+from dynamics import Settings, load_track, load_vehicle
 
 import railsim
+from railsim.contact.creep import LAWS, creep_force
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.linear.vehicle import LinearVehicle
 
@@ -48,3 +49,18 @@ def test_held_wheelsets_stand_where_each_speed_has_them(coach):
     alone = railsim.modes(coach, speed=25.0, held=True, **CURVE)
     second = railsim.root_locus(coach, speeds=[10.0, 25.0], held=True, **CURVE).sets[1]
     np.testing.assert_allclose(eigenvalues(second), eigenvalues(alone), rtol=1e-6)
+
+
+def test_only_laws_without_a_tangent_at_zero_creepage_are_remarked_on(coach):
+    """Of a wide patch, c11 > c22: the force for creepage in both directions is not the sum."""
+    patch, small = {"a": 4e-3, "b": 12e-3, "N": 7e4, "mu": 0.4, "phi": 0.0}, 1e-8
+    for law in LAWS:
+        along, across, both = (
+            np.array(creep_force(**patch, xi_x=x, xi_y=y, law=law)[:2])
+            for x, y in ((small, 0.0), (0.0, small), (small, small))
+        )
+        has_tangent = np.allclose(both, along + across, rtol=1e-3)
+        remarks = LinearVehicle(
+            coach, load_track("straight"), settings=Settings(creep_law=law)
+        ).remarks
+        assert has_tangent != any("no tangent at zero creepage" in one for one in remarks)
