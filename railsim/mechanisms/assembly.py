@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from railsim.arrays import Floats, Integers
+from railsim.arrays import Flags, Floats, Integers
 from railsim.definitions.mechanism.parts import Link, Prismatic, Revolute
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.model import Model
@@ -94,12 +94,21 @@ def open_loop(
 
 
 def dead_loop(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[str, ...]:
-    """Joints whose constraints depend on each other at a dead point, with the driver given."""
+    """Joints of the loop that still moves at a dead point, with the driver held.
+
+    Their constraints depend on each other and on those that hold the loop's ends, through which
+    forces go to the driver: joints between bodies none of which belong to the loop are left out.
+    """
     _, jacobian = constraints(model, s, pose, arcs)
-    left, _, _ = np.linalg.svd(jacobian / _scales(model, columns=True))
-    weight = np.abs(left[:, -1])
-    least, rows = IN_LOOP * np.max(weight), model.joint_rows
-    return tuple(name for name, (a, b) in rows.items() if np.max(weight[a:b]) > least)
+    left, _, right = np.linalg.svd(jacobian / _scales(model, columns=True))
+    force, motion = np.abs(left[:, -1]), np.abs(right[-1]).reshape(-1, 3).max(axis=1)
+    moving = motion > IN_LOOP * np.max(motion)
+    bodies: dict[str, Flags] = {}  # of each loaded joint, whether a body is one of its two
+    for name, (a, b) in model.joint_rows.items():
+        if np.max(force[a:b]) > IN_LOOP * np.max(force):
+            bodies[name] = jacobian[a:b].reshape(b - a, -1, 3).any(axis=(0, 2))
+    of_loop = np.any([those for those in bodies.values() if (those & moving).any()], axis=0)
+    return tuple(name for name, those in bodies.items() if not (those & ~of_loop).any())
 
 
 def _scales(model: Model, *, columns: bool = False) -> Floats:

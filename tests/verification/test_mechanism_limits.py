@@ -383,6 +383,29 @@ def test_joints_at_a_dead_point_are_those_of_its_loop_whatever_the_size(tmp_path
     assert named == ("left", "right", "begin", "end")
 
 
+@pytest.mark.parametrize("size", [0.1, 1.0, 10.0])
+def test_a_loop_that_drives_the_one_at_a_dead_point_is_not_named(tmp_path, size):
+    """Rod and lever of a second loop in line; through the first one the driver only holds it."""
+    far, arm, rod = np.array([1.9, -0.3]), 0.4, 0.3
+
+    def short_of(angle):
+        end = np.array([1.0 + arm * np.cos(angle), arm * np.sin(angle)])
+        return np.linalg.norm(far - end) - 2.0 * rod
+
+    dead = brentq(short_of, -0.9, -0.5)
+    path = tmp_path / "two.toml"
+    text = FOUR_BAR.format(rocker=arm * size, end=dead + 1e-7) + "start = -0.5\n" + SECOND_LOOP
+    text = text.replace("base = 1.0", f"base = {size}").replace("arm = 0.4", f"arm = {arm * size}")
+    second = text.index("[bodies.rod]")
+    text = text[:second] + text[second:].replace('"base"', '"0.3 * base"').replace("0.9", "0.3")
+    place = 'far = ["1.9 * base", "-0.3 * base"]\n[bodies.crank]'
+    path.write_text(text.replace("[bodies.crank]", place))
+    model = build(load_mechanism(path))
+    motion = solve(model, np.linspace(model.start, model.end, 30))
+    named = dead_loop(model, model.end, motion.q[-1], motion.arcs[-1])
+    assert named == ("right", "far", "third", "fourth")
+
+
 TINY = 5e-324  # the smallest number above 0
 LOW = "parameters.zone_low=0.6"
 WORK, HIGH = "parameters.zone_work", "parameters.zone_high"
