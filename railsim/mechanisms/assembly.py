@@ -106,7 +106,7 @@ def dead_loop(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[str
     bodies: dict[str, Flags] = {}  # of each loaded joint, whether a body is one of its two
     for name, (a, b) in model.joint_rows.items():
         if np.max(force[a:b]) > IN_LOOP * np.max(force):
-            bodies[name] = jacobian[a:b].reshape(b - a, -1, 3).any(axis=(0, 2))
+            bodies[name] = np.any(jacobian[a:b].reshape(b - a, -1, 3), axis=(0, 2))
     of_loop = np.any([those for those in bodies.values() if (those & moving).any()], axis=0)
     return tuple(name for name, those in bodies.items() if not (those & ~of_loop).any())
 
