@@ -93,7 +93,10 @@ class FileDefinition(Definition):
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with top-level keys replaced, validated again; raises `InputError`."""
-        return type(self)(**{**self.model_dump(exclude_none=True), **changes})
+        copy = type(self)(**{**self.model_dump(exclude_none=True), **changes})
+        if faults := copy.contradictions():
+            raise InputError(faults)
+        return copy.settled()
 
     def with_values(self, values: Mapping[str, Any]) -> Self:
         """Return a copy with other values at some keys, checked as a file would be.

@@ -136,3 +136,13 @@ def test_a_vehicle_with_signals_is_not_turned(tmp_path):
     rolling = {"quantity": "angle", "body": "carbody", "axis": "roll"}
     with pytest.raises(InputError, match=r"turned.*signals or controllers.*signs"):
         written(tmp_path, coach.replace(signals={"rolling": rolling}))
+    with pytest.raises(InputError, match=r"turned.*signals or controllers.*signs"):
+        coach.replace(signals={"rolling": rolling}).replace(turned=True)
+
+
+def test_a_vehicle_is_turned_by_replace_as_by_its_file(tmp_path):
+    coach = load_vehicle("coach_manchester")
+    bodies = coach.model_dump(exclude_none=True)["bodies"]
+    bodies["carbody"]["position"] = [0.3, 0.05, -1.8]
+    lopsided = coach.replace(bodies=bodies)
+    assert lopsided.replace(turned=True) == written(tmp_path, lopsided)
