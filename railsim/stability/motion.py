@@ -84,7 +84,9 @@ class VehicleMotion:
     """A vehicle on straight track, moved by the time loop of runs.
 
     Steps in which a flange strikes are divided as in runs only where the vehicle leaves the range
-    of the model without: that takes twice the time and moves no end of a branch by 0.1 m/s.
+    of the model without: that takes up to five times the time and moves no end of a branch by
+    0.1 m/s.  On rigid rails all steps are halved instead: hollow wheels strike them so hard that
+    steps of 1 ms throw a wheelset 1.6 mm further than those of 0.125 ms, of 0.5 ms 0.01 mm.
 
     `prepared`: on straight track; `scheme`: integration scheme, ``fast`` or ``rk4``; `mode`: one
     mode, in the shape of which the vehicle is disturbed: where all wheelsets are displaced alike,
@@ -95,7 +97,7 @@ class VehicleMotion:
         self.prepared, self.model, self.system = linear, linear.model, linear.system
         self.scheme = scheme
         self._steps: dict[int, float] = {}
-        self._parts = 1
+        self._parts = 1 if linear.system.support.elastic else 2
         self._allocate()
         names, known = linear.coordinates.names, mode.linearisation.names
         self._disturbed = linear.coordinates.indices[[names.index(name) for name in known]]

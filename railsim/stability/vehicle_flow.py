@@ -1,8 +1,8 @@
 """The time loop as the flow whose periodic motions are sought.
 
 Its state are all entries that move of the time loop's own state, memory of the fast scheme
-included, so that the periodic motions are those of the scheme and the step that runs use.  Spin
-rates are counted from steady rolling at the speed at hand.
+included, so that the periodic motions are those of the scheme and the step that runs use, on rigid
+rails of half the step.  Spin rates are counted from steady rolling at the speed at hand.
 """
 
 from concurrent.futures import ThreadPoolExecutor

@@ -575,7 +575,7 @@ def test_without_a_critical_speed_on_rigid_rails_a_remark_says_so(monkeypatch, a
 
     monkeypatch.setattr(railsim.stability.critical_speed, "_loss_of_hunting", lost)
     monkeypatch.setattr(railsim.stability.critical_speed, "_over_amplitude", lambda *_: None)
-    coach, law = load_vehicle("coach_flexicoil"), railsim.Settings(creep_law="polach")
+    coach, law = load_vehicle("coach_flexicoil"), railsim.Settings(creep_law="linear")
     found = critical_speed(coach, low=5.0, high=62.0, methods="linear", settings=law)
     assert (found.linear.speed, found.linear.speed_on_rigid_rails) == (58.0, None)
     assert found.remarks == [f"on rigid rails: {words} m/s"]

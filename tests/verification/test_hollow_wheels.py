@@ -14,9 +14,13 @@ from railsim.contact.exact_normal import exact_contact
 from railsim.contact.table import TableGrid, build_contact_table
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.linear.eigenmodes import eigenmodes
+from railsim.linear.vehicle import LinearVehicle
 from railsim.profiles import load_profile
 from railsim.profiles.profile import Profile
 from railsim.simulation import simulate
+from railsim.stability.motion import VehicleMotion
 
 CROSSING = Path(__file__).parents[1] / "data" / "crossing"
 LOAD = 60e3
@@ -188,3 +192,20 @@ def test_step_holds_where_wind_presses_a_vehicle_on_one_flange():
     for name in ("Q", "Y"):
         late, reference = (end[name][-100:].mean(axis=0) for end in ends)
         assert late == pytest.approx(reference, abs=2e-3 * ends[0].Q0.mean())
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+def test_hunting_on_rigid_rails_is_no_wider_than_in_short_steps():
+    """Steps of 1 ms threw a wheelset 8.2 mm to a side, those of 0.125 ms 6.56 mm."""
+    speed, wheel = 55.0, hollow_wheel(2e-3)
+    data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
+    axle = data["assemblies"]["bogie"]["assemblies"]["axle"]
+    axle["wheelsets"]["wheelset"]["profile"] = wheel.name
+    rails = load_track("straight").replace(support={"preset": "rigid"})
+    linear = LinearVehicle(Vehicle.model_validate(data), rails, profiles={wheel.name: wheel})
+    found = eigenmodes(linear.linearised(speed))
+    hunting = np.argmin(np.where(found.frequencies > 1.0, found.damping_ratios, np.inf))
+    motion = VehicleMotion(linear, "fast", found.taken([hunting]))
+    moved = motion.stretch(motion.rest(speed, 6e-3), speed, speed, 12.0)
+    late = moved.lateral[moved.time > 8.0]
+    np.testing.assert_allclose(0.5 * np.ptp(late, axis=0)[[0, 2]], 6.56e-3, atol=0.1e-3)
