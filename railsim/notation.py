@@ -11,7 +11,7 @@ from math import pi
 from typing import Any
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
-Y, Z, ROLL, YAW = 1, 2, 3, 5  # where they stand among the components of a body
+Y, Z, ROLL, PITCH, YAW = 1, 2, 3, 4, 5  # where they stand among the components of a body
 SIDES = ("left", "right")
 EXTREMES = ("max", "min")
 DECIMALS = {"kN": 2, "mm": 2, "mrad": 2, "%": 2, "-": 3, "N": 1, "1e-3": 3, "s": 2, "m": 1}

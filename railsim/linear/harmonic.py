@@ -1,42 +1,59 @@
 """First harmonic of the wheel-rail forces: a linearisation for a finite lateral amplitude.
 
-A wheelset is moved by y = a sin(theta) along the contact path, that is with z and roll such that
-the vertical force and the roll moment of its contacts stay as they are.  With F any derivative of
-the state, its first harmonic over 24 angles
+Every wheelset is moved as in hunting, with theta = omega t
 
-    H[F] = 1/(pi a) integral F sin(theta) d theta
+    y = Re(Y e^(i theta))     yaw = Re(P e^(i theta))
 
-is what a linear system has to give for a motion of this amplitude (describing function, Krylov and
-Bogoliubov 1937; for wheelsets equivalent conicity with the real contact).  As the tangent's columns
-of z and roll stay, the column of y becomes
+and the velocities of this motion, along the contact path: with z, roll and spin rate such that the
+vertical force, the roll moment and the torque about the axle of its contacts stay as they are.  (The
+mean of both rolling radii changes with y.  The spin follows in less than 1 ms; held, the wheels
+would creep along by what at low friction uses up most of it.)  With F any derivative of the state,
+its first harmonic over 16 angles
 
-    A_y = H[F] - A_z H[z] - A_roll H[roll],
+    H[F] = 1/pi integral F e^(-i theta) d theta
 
-so that a motion along the path has just these forces, and the tangent is the limit of small a.  In
-hunting the yaw rate is in phase with y, the yaw angle and the lateral velocity a quarter ahead or
-behind: their columns, the slopes of the creep forces, are the means of 2 sin^2 and 2 cos^2 times
-those along the path.  Else the slopes at rest, where the patch of worn or conforming profiles is
-larger than beside it, would meet the rolling radii of the path.  The contact feels the motion
-against the rails: what changes in the columns of y and its velocity changes in those of elastic
-rails by half of the opposite each.
+is what a linear system has to give for this motion (describing function, Krylov and Bogoliubov
+1937; for wheelsets equivalent conicity with the real contact).  The tangent's columns of z, roll
+and spin stay.  Those of yaw, yaw rate and lateral velocity, the slopes of the creep forces, are
+their means along the path: the slopes at rest, where the patch of worn or conforming profiles is
+larger than beside it, would meet the rolling radii of the path.  What is left of H[F] is in phase
+with y the column of y, and a quarter beside it is added to that of the lateral velocity: a motion
+along the path has just these forces, and the tangent is the limit of small amplitudes.
+
+omega and P/Y of every wheelset are those of a hunting mode of the linearisation itself, found by
+iteration (harmonic balance): on the yaw rate, and on the lateral creepage of trailing wheelsets
+above all, depends how near to saturation the creep forces are.  The larger one of |Y| and
+V |P|/omega is the amplitude, for every wheelset: axles of one frame yaw alike, and the one that
+creeps across moves less.  On the path y' is 0 and the yaw P - i omega Y/V, with the same lateral
+creepage: flanges are not pressed by a velocity that z and roll do not follow.  The contact feels the
+motion against the rails: what changes in the columns of y and its velocity changes in those of
+elastic rails by half of the opposite each.
 """
-
-from collections.abc import Sequence
 
 import numpy as np
 
-from railsim.arrays import Floats, Integers
+from railsim.arrays import Complexes, Floats, Integers
 from railsim.errors import ModelError, argument_error
+from railsim.kernels.state import SPEED
 from railsim.kernels.support import RAIL_DOF
 from railsim.linear.coordinates import FreeVehicle
-from railsim.notation import ROLL, YAW, Y, Z
+from railsim.linear.eigenmodes import SEARCHED, SLOWEST
+from railsim.notation import PITCH, ROLL, YAW, Y, Z
 
-ANGLES = 24
-BALANCED = 1e-2  # N and N m, of a wheelset's vertical force and roll moment
-MOST_ITERATIONS = 15
+ANGLES = 16
+FEWER = 2  # every second one is enough for the means of slopes
+BALANCED = 1e-2  # N and N m, of a wheelset's vertical force, roll moment and axle torque
+MOST_ITERATIONS = 100
 SLOW = 0.1  # ratio of two residuals from which on slopes are formed again
-STEP = 1e-8  # m and rad
+STEPS = np.array([1e-8, 1e-8, 1e-5])  # m, rad and rad/s
+LONGEST = np.array([2e-4, 4e-4, 3e-3])  # of an iteration: m, rad, parts of the spin rate
 CREEP = 1e-6  # m/s, rad/s and rad, for slopes of the creep forces
+SAME = 1e-2  # change of a motion in parts of the amplitude, below which it is that of the mode
+MOST_MOTIONS = 30
+OVERSHOOTS = 5  # motions after which the mean of the last two follows
+ALIKE = 0.7  # ratio of two modes' marks of hunting above which their damping decides
+LEAST_MARK = 1e-3  # of a mode that is hunting
+LEAST = 0.3  # part of the amplitude by which a wheelset moves across at least
 
 
 class ContactPath:
@@ -44,9 +61,9 @@ class ContactPath:
 
     def __init__(self, amplitude: float) -> None:
         self.amplitude = amplitude
-        # where the path was found last, and the slopes there: the next speed's are near
-        self._known: dict[float, Floats] = {}
-        self._slopes: dict[float, Floats] = {}
+        # where the path was found last, and the slopes there: the next motion's are near
+        self._known: dict[int, Floats] = {}
+        self._slopes: dict[int, Floats] = {}
 
     def matrix(self, vehicle: FreeVehicle, tangent: Floats) -> Floats:
         """Return the matrix of a linearisation with the columns of y and of creepage replaced.
@@ -54,84 +71,145 @@ class ContactPath:
         `tangent`: its tangent matrix. Raises InputError: the contact table is narrower than the
         amplitude.
         """
-        c = vehicle.coordinates
-        place, velocity = c.position_of, c.velocity_of
-        bodies = vehicle.system.contact.body
-        columns = np.array([[place[b, k] for k in (Y, Z, ROLL)] for b in bodies])
-        creeping = [
-            [of[b, k] for b in bodies] for of, k in ((velocity, YAW), (velocity, Y), (place, YAW))
-        ]
-        # sin(theta) has the same value at two angles of a quadrant's pair
-        sines = np.sin(2.0 * np.pi * (np.arange(ANGLES // 4) + 0.5) / ANGLES)
-        sines = np.concatenate([sines, -sines])
+        found, before = tangent, None
         try:
-            poses = self._path(vehicle, columns, sines)
-            moved = np.tile(vehicle.x, (*poses.shape[:2], 1))
-            for w, column in enumerate(columns):  # each alone
-                moved[:, w, column] += poses[:, w]
-            rates = _rates(vehicle, moved)
-            slopes = [_slopes(vehicle, moved, of) for of in creeping]
+            for number in range(MOST_MOTIONS):
+                omega, turning = _hunting(vehicle, found, before)
+                if before is not None:
+                    if np.max(np.abs(turning - before)) < SAME * omega:
+                        return found
+                    if number > OVERSHOOTS:
+                        turning = 0.5 * (turning + before)
+                before = turning
+                found = self._about(vehicle, tangent, omega, turning)
+            raise ModelError("no hunting in harmonic balance")
         except ModelError as error:
             words = f"found {1e3 * self.amplitude:.12g} mm, but {error}"
             raise argument_error("amplitude", words, "a smaller amplitude") from None
-        shares = 4.0 * sines / (ANGLES * self.amplitude)
-        force, path = (np.tensordot(shares, values, 1) for values in (rates, poses))
+
+    def _about(
+        self, vehicle: FreeVehicle, tangent: Floats, omega: float, turning: Complexes
+    ) -> Floats:
+        """The matrix for a motion of the wheelsets."""
+        c, speed = vehicle.coordinates, float(vehicle.state[SPEED])
+        place, velocity = c.position_of, c.velocity_of
+        bodies = vehicle.system.contact.body
+        moving = np.array([[place[b, Y], place[b, YAW], velocity[b, YAW]] for b in bodies])
+        led = np.array([[place[b, Z], place[b, ROLL], velocity[b, PITCH]] for b in bodies])
+        turns = np.exp(2j * np.pi * (np.arange(ANGLES) + 0.5) / ANGLES)
+        y = self.amplitude / np.maximum(1.0, np.abs(turning) / omega)
+        yaw = y * np.stack([turning - 1j * omega, 1j * omega * turning]) / speed
+        moves = np.stack([y, *yaw], axis=1)
+        given = (turns[:, None, None] * moves).real
+        poses = self._path(vehicle, moving, led, given)
+        moved = np.tile(vehicle.x, (ANGLES, len(bodies), 1))
+        for w, (columns, others) in enumerate(zip(moving, led, strict=True)):  # each alone
+            moved[:, w, columns] += given[:, w]
+            moved[:, w, others] += poses[:, w]
+        share = 2.0 / ANGLES * turns.conj()
+        force, path = (np.tensordot(share, v, 1) for v in (_rates(vehicle, moved), poses))
         found = tangent.copy()
-        for (y, z, roll), rate, (_, height, angle) in zip(columns, force, path, strict=True):
-            found[:, y] = rate - tangent[:, z] * height - tangent[:, roll] * angle
-        with_y, beside = 4.0 * sines**2 / ANGLES, 4.0 * (1.0 - sines**2) / ANGLES
-        for of, share, slope in zip(creeping, (with_y, beside, beside), slopes, strict=True):
-            found[:, of] = np.tensordot(share, slope, 1).T
-        for w, body in enumerate(bodies):
+        sideways = np.array([velocity[b, Y] for b in bodies])
+        for columns in (sideways, *moving.T[1:]):
+            found[:, columns] = _slopes(vehicle, moved[::FEWER], columns).mean(axis=0).T
+        for w, (columns, others) in enumerate(zip(moving, led, strict=True)):
+            left = force[w] - tangent[:, others] @ path[w] - found[:, columns[1:]] @ moves[w, 1:]
+            left /= moves[w, 0]
+            found[:, columns[0]] = left.real
+            found[:, sideways[w]] += left.imag / omega
             rails = np.flatnonzero((c.wheelsets == w) & (c.bodies < 0))
-            for own, felt in zip((place, velocity), np.split(rails, 2), strict=True):
-                change = found[:, own[body, Y]] - tangent[:, own[body, Y]]
+            for own, felt in zip((columns[0], sideways[w]), np.split(rails, 2), strict=True):
+                change = found[:, own] - tangent[:, own]
                 found[:, felt[:RAIL_DOF:2]] -= 0.5 * change[:, None]
         return found
 
-    def _path(self, vehicle: FreeVehicle, columns: Integers, sines: Floats) -> Floats:
-        """Return y, z, roll of the wheelsets on their paths, float64[sine, wheelset, 3]."""
-        goal, found = _forces(vehicle, vehicle.x), np.zeros((len(sines), *columns.shape))
-        for i, y in enumerate(self.amplitude * sines):
-            # from the middle outwards: far from its path a wheelset stands on one rail
-            outwards = i % (len(sines) // 2) > 0
-            guess = found[i - 1, :, 1:] * (y / found[i - 1, 0, 0]) if outwards else 0.0
-            self._known[y] = self._on_path(vehicle, columns, y, self._known.get(y, guess), goal)
-            found[i, :, 0], found[i, :, 1:] = y, self._known[y]
+    def _path(self, vehicle: FreeVehicle, moving: Integers, led: Integers, given: Floats) -> Floats:
+        """Return z, roll and spin rate of the wheelsets on their paths, float64[angle, wheelset, 3].
+
+        All move at once: none feels another's rails.
+        """
+        goal, found = _forces(vehicle, vehicle.x), np.zeros((*given.shape[:2], 3))
+        across, near = given[:, 0, 0], {True: (1.0, found[0]), False: (1.0, found[0])}
+        # from the middle outwards: far from its path a wheelset stands on one rail
+        for i in np.argsort(np.abs(across), kind="stable").tolist():
+            x, (y, pose) = vehicle.x, near[across[i] > 0.0]
+            x[moving] += given[i]
+            guess = self._known.get(i, pose * (across[i] / y))
+            found[i] = self._known[i] = self._on_path(vehicle, x, led, i, guess, goal)
+            near[across[i] > 0.0] = across[i], found[i]
         return found
 
     def _on_path(
-        self, vehicle: FreeVehicle, columns: Integers, y: float, guess: Floats | float, goal: Floats
+        self, vehicle: FreeVehicle, x: Floats, led: Integers, angle: int, pose: Floats, goal: Floats
     ) -> Floats:
-        """Return z and roll of all wheelsets, moved by y at once: none feels another's rails."""
+        """Return z, roll and spin rate at one angle."""
 
         def missing(pose: Floats) -> Floats:
-            x = vehicle.x
-            x[columns] += np.insert(pose, 0, y, axis=1)
-            return _forces(vehicle, x) - goal
+            trial = x.copy()
+            trial[led] += pose
+            return _forces(vehicle, trial) - goal
 
-        pose, before = np.zeros((len(columns), 2)) + guess, np.inf
+        before, one = np.inf, np.ones(len(led))
         for _ in range(MOST_ITERATIONS):
             value = missing(pose)
             size = float(np.max(np.abs(value)))
             if size < BALANCED:
                 return pose
-            if y not in self._slopes or size > SLOW * before:
-                ends = [[missing(pose + d * STEP * e) for d in (1.0, -1.0)] for e in np.eye(2)]
-                self._slopes[y] = np.stack([a - b for a, b in ends], axis=2) / (2.0 * STEP)
-            try:
-                pose = pose - np.linalg.solve(self._slopes[y], value[..., None])[..., 0]
-            except np.linalg.LinAlgError:  # a wheelset off its rails has no slopes
-                break
+            if angle not in self._slopes or size > SLOW * before:
+                ends = [[missing(pose + d * e) for d in (1.0, -1.0)] for e in np.diag(STEPS)]
+                slopes = np.stack([a - b for a, b in ends], axis=2) / (2.0 * STEPS)
+                # without friction no torque, off its rails a wheelset has no slopes at all
+                self._slopes[angle] = np.linalg.pinv(slopes, rcond=1e-12)
+            step = (self._slopes[angle] @ value[..., None])[..., 0]
+            longest = LONGEST * np.stack([one, one, np.abs(x[led[:, 2]])], axis=1)
+            excess = np.abs(step) / longest
+            excess[:, :2] = excess[:, :2].max(axis=1, keepdims=True)
+            pose = pose - step / np.maximum(1.0, excess)
             before = size
         raise ModelError("no contact path")
+
+
+def _hunting(
+    vehicle: FreeVehicle, matrix: Floats, before: Complexes | None
+) -> tuple[float, Complexes]:
+    """omega [rad/s] and V P/Y [1/s] of the wheelsets in hunting, by a matrix.
+
+    Of all modes that have most of what marks it, wheelsets that move across most of all bodies and
+    roll as they do so, with a yaw angle of y'/V, it is the least damped one, or the most like
+    `before`.  |V P/Y| is omega / `LEAST` at most.  Where
+    nothing hunts, such as without friction, wheelsets roll by 1 rad/m.
+    """
+    place, linear = vehicle.coordinates.position_of, vehicle.linearisation(matrix)
+    bodies, speed = vehicle.system.contact.body, linear.parameter
+    values, shapes = np.linalg.eig(linear.matrix)
+    hertz = values.imag / (2.0 * np.pi)
+    inside = np.flatnonzero((hertz > SLOWEST) & (np.abs(values) < 2.0 * np.pi * SEARCHED[1]))
+    values, shapes = values[inside], shapes.T[inside]
+    y, yaw = (shapes[:, [place[b, k] for b in bodies]] for k in (Y, YAW))
+    size = np.linalg.norm(y, axis=1) * np.linalg.norm(yaw, axis=1)
+    most = np.abs(shapes[:, vehicle.coordinates.positions]).max(axis=1)
+    marks = np.sum(1j * y * yaw.conj(), axis=1).real * np.abs(y).max(axis=1)
+    marks /= np.maximum(size * most, np.finfo(float).tiny)
+    highest = np.max(marks, initial=0.0)
+    if highest < LEAST_MARK:
+        return speed, np.full(len(bodies), 1j * speed)
+    inside = np.flatnonzero(marks >= ALIKE * highest)
+    values, turning = values[inside], speed * yaw[inside] / y[inside]
+    if before is None:
+        chosen = np.argmax(values.real / np.abs(values))
+    else:
+        chosen = np.argmin(np.abs(turning - before).max(axis=1))
+    omega, found = float(values[chosen].imag), turning[chosen]
+    if not vehicle.is_straight:
+        return omega, np.full(len(bodies), 1j * omega)
+    return omega, found / np.maximum(1.0, LEAST / omega * np.abs(found))
 
 
 def _rates(vehicle: FreeVehicle, moved: Floats) -> Floats:
     return vehicle.rates(moved.reshape(-1, len(vehicle.x))).reshape(moved.shape)
 
 
-def _slopes(vehicle: FreeVehicle, moved: Floats, of: Sequence[int]) -> Floats:
+def _slopes(vehicle: FreeVehicle, moved: Floats, of: Integers) -> Floats:
     """Derivatives of the rates with respect to a coordinate of each wheelset, as `moved`."""
     step = np.zeros(moved.shape[1:])
     step[np.arange(len(of)), of] = CREEP
@@ -139,6 +217,6 @@ def _slopes(vehicle: FreeVehicle, moved: Floats, of: Sequence[int]) -> Floats:
 
 
 def _forces(vehicle: FreeVehicle, x: Floats) -> Floats:
-    """Vertical force and roll moment that the rails give each wheelset, float64[wheelset, 2]."""
+    """Vertical force, roll moment, axle torque from the rails, float64[wheelset, 3]."""
     vehicle.rate(x)
-    return np.asarray(vehicle.work.rail_force[vehicle.system.contact.body, 2:4])
+    return np.asarray(vehicle.work.rail_force[vehicle.system.contact.body, 2:5])
