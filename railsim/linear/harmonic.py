@@ -5,10 +5,10 @@ Every wheelset is moved as in hunting, with theta = omega t
     y = Re(Y e^(i theta))     yaw = Re(P e^(i theta))
 
 and the velocities of this motion, along the contact path: with z, roll and spin rate such that the
-vertical force, the roll moment and the torque about the axle of its contacts stay as they are.  (The
-mean of both rolling radii changes with y.  The spin follows in less than 1 ms; held, the wheels
-would creep along by what at low friction uses up most of it.)  With F any derivative of the state,
-its first harmonic over 16 angles
+vertical force, the roll moment and the torque about the axle of its contacts stay as they are.
+(The mean of both rolling radii changes with y.  The spin follows in less than 1 ms; held, the
+wheels would creep along by what at low friction uses up most of it.)  With F any derivative of the
+state, its first harmonic over 16 angles
 
     H[F] = 1/pi integral F e^(-i theta) d theta
 
@@ -25,9 +25,10 @@ iteration (harmonic balance): on the yaw rate, and on the lateral creepage of tr
 above all, depends how near to saturation the creep forces are.  The larger one of |Y| and
 V |P|/omega is the amplitude, for every wheelset: axles of one frame yaw alike, and the one that
 creeps across moves less.  On the path y' is 0 and the yaw P - i omega Y/V, with the same lateral
-creepage: flanges are not pressed by a velocity that z and roll do not follow.  The contact feels the
-motion against the rails: what changes in the columns of y and its velocity changes in those of
-elastic rails by half of the opposite each.
+creepage: flanges are not pressed by a velocity that z and roll do not follow.  In curves, where a
+wheelset at its flange hardly moves across, P is i omega Y/V, and so it is for wheelsets that take
+no part.  The contact feels the motion against the rails: what changes in the columns of y and its
+velocity changes in those of elastic rails by half of the opposite each.
 """
 
 import numpy as np
@@ -53,6 +54,7 @@ MOST_MOTIONS = 30
 OVERSHOOTS = 5  # motions after which the mean of the last two follows
 ALIKE = 0.7  # ratio of two modes' marks of hunting above which their damping decides
 LEAST_MARK = 1e-3  # of a mode that is hunting
+NO_PART = 1e-6  # of the largest motion across in a mode
 LEAST = 0.3  # part of the amplitude by which a wheelset moves across at least
 
 
@@ -124,7 +126,7 @@ class ContactPath:
         return found
 
     def _path(self, vehicle: FreeVehicle, moving: Integers, led: Integers, given: Floats) -> Floats:
-        """Return z, roll and spin rate of the wheelsets on their paths, float64[angle, wheelset, 3].
+        """Return z, roll, spin rate of the wheelsets on their paths, float64[angle, wheelset, 3].
 
         All move at once: none feels another's rails.
         """
@@ -172,12 +174,12 @@ class ContactPath:
 def _hunting(
     vehicle: FreeVehicle, matrix: Floats, before: Complexes | None
 ) -> tuple[float, Complexes]:
-    """omega [rad/s] and V P/Y [1/s] of the wheelsets in hunting, by a matrix.
+    """Return omega [rad/s] and V P/Y [1/s] of the wheelsets in hunting, by a matrix.
 
     Of all modes that have most of what marks it, wheelsets that move across most of all bodies and
     roll as they do so, with a yaw angle of y'/V, it is the least damped one, or the most like
-    `before`.  |V P/Y| is omega / `LEAST` at most.  Where
-    nothing hunts, such as without friction, wheelsets roll by 1 rad/m.
+    `before`.  |V P/Y| is omega / `LEAST` at most.  Where nothing hunts, such as without friction,
+    wheelsets roll by 1 rad/m.
     """
     place, linear = vehicle.coordinates.position_of, vehicle.linearisation(matrix)
     bodies, speed = vehicle.system.contact.body, linear.parameter
@@ -194,15 +196,19 @@ def _hunting(
     if highest < LEAST_MARK:
         return speed, np.full(len(bodies), 1j * speed)
     inside = np.flatnonzero(marks >= ALIKE * highest)
-    values, turning = values[inside], speed * yaw[inside] / y[inside]
+    values, y, yaw = values[inside], y[inside], yaw[inside]
+    # by rounding, wheelsets of another bogie under a held car
+    still = np.abs(y) < NO_PART * np.abs(y).max(axis=1, keepdims=True)
+    rolling = 1j * values.imag[:, None]
+    turning = np.where(
+        still | (not vehicle.is_straight), rolling, speed * yaw / np.where(still, 1.0, y)
+    )
+    turning /= np.maximum(1.0, LEAST * np.abs(turning / rolling))
     if before is None:
         chosen = np.argmax(values.real / np.abs(values))
     else:
         chosen = np.argmin(np.abs(turning - before).max(axis=1))
-    omega, found = float(values[chosen].imag), turning[chosen]
-    if not vehicle.is_straight:
-        return omega, np.full(len(bodies), 1j * omega)
-    return omega, found / np.maximum(1.0, LEAST / omega * np.abs(found))
+    return float(values[chosen].imag), turning[chosen]
 
 
 def _rates(vehicle: FreeVehicle, moved: Floats) -> Floats:

@@ -92,7 +92,7 @@ def critical_speed(
         Sizes of the disturbances from which hunting is sought: lateral displacement of a wheelset
         in the shape of the hunting mode [m].
     over_amplitude : bool
-        Find the linear critical speed over amplitude and on rigid rails too, 3 to 6 s of CPU time.
+        Find the linear critical speed over amplitude and on rigid rails too, 10 to 20 s of CPU.
     settings : Settings, optional
         Scheme, creep law, contact.
     profiles : mapping of str to Profile, optional
