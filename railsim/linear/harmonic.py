@@ -53,7 +53,7 @@ SAME = 1e-2  # change of a motion in parts of the amplitude, below which it is t
 MOST_MOTIONS = 30
 OVERSHOOTS = 5  # motions after which the mean of the last two follows
 ALIKE = 0.7  # ratio of two modes' marks of hunting above which their damping decides
-LEAST_MARK = 1e-3  # of a mode that is hunting
+LEAST_MARK = 0.02  # of a mode that is hunting
 NO_PART = 1e-6  # of the largest motion across in a mode
 LEAST = 0.3  # part of the amplitude by which a wheelset moves across at least
 
@@ -76,14 +76,14 @@ class ContactPath:
         found, before = tangent, None
         try:
             for number in range(MOST_MOTIONS):
-                omega, turning = _hunting(vehicle, found, before)
+                motion = _hunting(vehicle, found, before)
                 if before is not None:
-                    if np.max(np.abs(turning - before)) < SAME * omega:
+                    if np.max(np.abs(motion - before)) < SAME * motion[0].real:
                         return found
                     if number > OVERSHOOTS:
-                        turning = 0.5 * (turning + before)
-                before = turning
-                found = self._about(vehicle, tangent, omega, turning)
+                        motion = 0.5 * (motion + before)
+                before = motion
+                found = self._about(vehicle, tangent, float(motion[0].real), motion[1:])
             raise ModelError("no hunting in harmonic balance")
         except ModelError as error:
             words = f"found {1e3 * self.amplitude:.12g} mm, but {error}"
@@ -171,15 +171,13 @@ class ContactPath:
         raise ModelError("no contact path")
 
 
-def _hunting(
-    vehicle: FreeVehicle, matrix: Floats, before: Complexes | None
-) -> tuple[float, Complexes]:
-    """Return omega [rad/s] and V P/Y [1/s] of the wheelsets in hunting, by a matrix.
+def _hunting(vehicle: FreeVehicle, matrix: Floats, before: Complexes | None) -> Complexes:
+    """Return omega and, of each wheelset, V P/Y in hunting, by a matrix [1/s].
 
     Of all modes that have most of what marks it, wheelsets that move across most of all bodies and
-    roll as they do so, with a yaw angle of y'/V, it is the least damped one, or the most like
-    `before`.  |V P/Y| is omega / `LEAST` at most.  Where nothing hunts, such as without friction,
-    wheelsets roll by 1 rad/m.
+    roll as they do so, with a yaw angle of y'/V, it is the least damped one, or the most like the
+    motion `before`.  |V P/Y| is omega / `LEAST` at most.  Where nothing hunts, such as without
+    friction, wheelsets roll by 1 rad/m.
     """
     place, linear = vehicle.coordinates.position_of, vehicle.linearisation(matrix)
     bodies, speed = vehicle.system.contact.body, linear.parameter
@@ -188,27 +186,25 @@ def _hunting(
     inside = np.flatnonzero((hertz > SLOWEST) & (np.abs(values) < 2.0 * np.pi * SEARCHED[1]))
     values, shapes = values[inside], shapes.T[inside]
     y, yaw = (shapes[:, [place[b, k] for b in bodies]] for k in (Y, YAW))
-    size = np.linalg.norm(y, axis=1) * np.linalg.norm(yaw, axis=1)
+    rolling, turned = 1j * values.imag[:, None] * y, speed * yaw
     most = np.abs(shapes[:, vehicle.coordinates.positions]).max(axis=1)
-    marks = np.sum(1j * y * yaw.conj(), axis=1).real * np.abs(y).max(axis=1)
-    marks /= np.maximum(size * most, np.finfo(float).tiny)
+    creeps, both = np.linalg.norm([rolling - turned, np.abs(rolling) + np.abs(turned)], axis=2)
+    marks = (1.0 - creeps / np.maximum(both, np.finfo(float).tiny)) * np.abs(y).max(axis=1) / most
     highest = np.max(marks, initial=0.0)
     if highest < LEAST_MARK:
-        return speed, np.full(len(bodies), 1j * speed)
+        return np.array([speed, *[1j * speed] * len(bodies)])
     inside = np.flatnonzero(marks >= ALIKE * highest)
-    values, y, yaw = values[inside], y[inside], yaw[inside]
+    omega, y, turned = values.imag[inside, None], y[inside], turned[inside]
     # by rounding, wheelsets of another bogie under a held car
     still = np.abs(y) < NO_PART * np.abs(y).max(axis=1, keepdims=True)
-    rolling = 1j * values.imag[:, None]
-    turning = np.where(
-        still | (not vehicle.is_straight), rolling, speed * yaw / np.where(still, 1.0, y)
-    )
-    turning /= np.maximum(1.0, LEAST * np.abs(turning / rolling))
-    if before is None:
-        chosen = np.argmax(values.real / np.abs(values))
-    else:
-        chosen = np.argmin(np.abs(turning - before).max(axis=1))
-    return float(values[chosen].imag), turning[chosen]
+    no_creep = still | (not vehicle.is_straight)
+    turning = np.where(no_creep, 1j * omega, turned / np.where(still, 1.0, y))
+    turning /= np.maximum(1.0, LEAST / omega * np.abs(turning))
+    motions = np.hstack([omega, turning])
+    damping = -values.real[inside] / np.abs(values[inside])
+    if before is not None:
+        return motions[np.argmin(np.abs(motions - before).max(axis=1))]
+    return motions[np.argmin(damping)]
 
 
 def _rates(vehicle: FreeVehicle, moved: Floats) -> Floats:
