@@ -47,7 +47,8 @@ BALANCED = 1e-2  # N and N m, of a wheelset's vertical force, roll moment and ax
 MOST_ITERATIONS = 100
 SLOW = 0.1  # ratio of two residuals from which on slopes are formed again
 STEPS = np.array([1e-8, 1e-8, 1e-5])  # m, rad and rad/s
-LONGEST = np.array([2e-4, 4e-4, 3e-3])  # of an iteration: m, rad, parts of the spin rate
+LONGEST = np.array([2e-4, 4e-4, 4e-3])  # first step: m, rad, parts of the spin rate
+SHORTER = 0.95  # ratio of the longest steps of two iterations: those across a kink end
 CREEP = 1e-6  # m/s, rad/s and rad, for slopes of the creep forces
 SAME = 1e-2  # change of a motion in parts of the amplitude, below which it is that of the mode
 MOST_MOTIONS = 30
@@ -152,7 +153,7 @@ class ContactPath:
             return _forces(vehicle, trial) - goal
 
         before, one = np.inf, np.ones(len(led))
-        for _ in range(MOST_ITERATIONS):
+        for number in range(MOST_ITERATIONS):
             value = missing(pose)
             size = float(np.max(np.abs(value)))
             if size < BALANCED:
@@ -161,10 +162,10 @@ class ContactPath:
                 ends = [[missing(pose + d * e) for d in (1.0, -1.0)] for e in np.diag(STEPS)]
                 slopes = np.stack([a - b for a, b in ends], axis=2) / (2.0 * STEPS)
                 # without friction no torque, off its rails a wheelset has no slopes at all
-                self._slopes[angle] = np.linalg.pinv(slopes, rcond=1e-12)
+                self._slopes[angle] = np.asarray(np.linalg.pinv(slopes, rcond=1e-12), float)
             step = (self._slopes[angle] @ value[..., None])[..., 0]
             longest = LONGEST * np.stack([one, one, np.abs(x[led[:, 2]])], axis=1)
-            excess = np.abs(step) / longest
+            excess = np.abs(step) / (longest * SHORTER**number)
             excess[:, :2] = excess[:, :2].max(axis=1, keepdims=True)
             pose = pose - step / np.maximum(1.0, excess)
             before = size
@@ -201,10 +202,10 @@ def _hunting(vehicle: FreeVehicle, matrix: Floats, before: Complexes | None) -> 
     turning = np.where(no_creep, 1j * omega, turned / np.where(still, 1.0, y))
     turning /= np.maximum(1.0, LEAST / omega * np.abs(turning))
     motions = np.hstack([omega, turning])
-    damping = -values.real[inside] / np.abs(values[inside])
+    rank = -values.real[inside] / np.abs(values[inside])
     if before is not None:
-        return motions[np.argmin(np.abs(motions - before).max(axis=1))]
-    return motions[np.argmin(damping)]
+        rank = np.abs(motions - before).max(axis=1)
+    return np.asarray(motions[np.argmin(rank)])
 
 
 def _rates(vehicle: FreeVehicle, moved: Floats) -> Floats:
