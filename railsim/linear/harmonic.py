@@ -52,7 +52,7 @@ SHORTER = 0.95  # ratio of the longest steps of two iterations: those across a k
 CREEP = 1e-6  # m/s, rad/s and rad, for slopes of the creep forces
 SAME = 1e-2  # change of a motion in parts of the amplitude, below which it is that of the mode
 MOST_MOTIONS = 30
-OVERSHOOTS = 5  # motions after which the mean of the last two follows
+OVERSHOOTS = 3  # motions after which the mean of the last two follows
 ALIKE = 0.7  # ratio of two modes' marks of hunting above which their damping decides
 LEAST_MARK = 0.02  # of a mode that is hunting
 NO_PART = 1e-6  # of the largest motion across in a mode
@@ -74,15 +74,15 @@ class ContactPath:
         `tangent`: its tangent matrix. Raises InputError: the contact table is narrower than the
         amplitude.
         """
-        found, before = tangent, None
+        found, before, shape = tangent, None, None
         try:
             for number in range(MOST_MOTIONS):
-                motion = _hunting(vehicle, found, before)
+                motion, shape = _hunting(vehicle, found, shape)
                 if before is not None:
-                    if np.max(np.abs(motion - before)) < SAME * motion[0].real:
+                    shares = np.array([1.0, *shape.taking_part])
+                    if np.max(shares * np.abs(motion - before)) < SAME * motion[0].real:
                         return found
-                    if number > OVERSHOOTS:
-                        motion = 0.5 * (motion + before)
+                    motion = before + (motion - before) * min(1.0, OVERSHOOTS / number)
                 before = motion
                 found = self._about(vehicle, tangent, float(motion[0].real), motion[1:])
             raise ModelError("no hunting in harmonic balance")
@@ -172,7 +172,12 @@ class ContactPath:
         raise ModelError("no contact path")
 
 
-def _hunting(vehicle: FreeVehicle, matrix: Floats, before: Complexes | None) -> Complexes:
+class S:
+    def __init__(self, shape, taking_part):
+        self.shape, self.taking_part = shape, taking_part
+
+
+def _hunting(vehicle: FreeVehicle, matrix: Floats, before) -> Complexes:
     """Return omega and, of each wheelset, V P/Y in hunting, by a matrix [1/s].
 
     Of all modes that have most of what marks it, wheelsets that move across most of all bodies and
@@ -193,7 +198,8 @@ def _hunting(vehicle: FreeVehicle, matrix: Floats, before: Complexes | None) -> 
     marks = (1.0 - creeps / np.maximum(both, np.finfo(float).tiny)) * np.abs(y).max(axis=1) / most
     highest = np.max(marks, initial=0.0)
     if highest < LEAST_MARK:
-        return np.array([speed, *[1j * speed] * len(bodies)])
+        n = len(bodies)
+        return np.array([speed, *[1j * speed] * n]), S(np.ones(2 * n, complex), np.ones(n))
     inside = np.flatnonzero(marks >= ALIKE * highest)
     omega, y, turned = values.imag[inside, None], y[inside], turned[inside]
     # by rounding, wheelsets of another bogie under a held car
@@ -203,9 +209,13 @@ def _hunting(vehicle: FreeVehicle, matrix: Floats, before: Complexes | None) -> 
     turning /= np.maximum(1.0, LEAST / omega * np.abs(turning))
     motions = np.hstack([omega, turning])
     rank = -values.real[inside] / np.abs(values[inside])
+    forms = np.hstack([speed * yaw[inside], 1j * omega * y])
+    forms /= np.linalg.norm(forms, axis=1, keepdims=True)
     if before is not None:
-        rank = np.abs(motions - before).max(axis=1)
-    return np.asarray(motions[np.argmin(rank)])
+        rank = -np.abs(forms @ before.shape.conj())
+    k = np.argmin(rank)
+    size = np.abs(y[k])
+    return np.asarray(motions[k]), S(forms[k], size / size.max())
 
 
 def _rates(vehicle: FreeVehicle, moved: Floats) -> Floats:
