@@ -168,7 +168,7 @@ class FreeVehicle:
         self._reference = 6 * reference, 6 * self._n + 6 * reference
         self.system = system._replace(drive=Drive(FREE, np.zeros((1, 2)), np.zeros(3)))
         self.evaluate(state)  # for the frames
-        self.is_straight = not self.work.frames[:, OMEGA : OMEGA + 3].any()
+        self._is_straight = not self.work.frames[:, OMEGA : OMEGA + 3].any()
 
     @property
     def x(self) -> Floats:
@@ -241,7 +241,7 @@ class FreeVehicle:
         of_velocities = slice(velocity_begin(self._n), internal_begin(self._n))
         velocities = derivatives[:, of_velocities].reshape(len(x), -1, 6)
         change = derivatives[:, -1, None]
-        if self.is_straight:
+        if self._is_straight:
             velocities[:, self._whole, 0] += change
         else:
             velocities[:, self._whole, :3] += change[:, None] * self._directions(trials)

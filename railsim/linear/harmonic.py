@@ -25,11 +25,16 @@ iteration (harmonic balance): on the yaw rate, and on the lateral creepage of tr
 above all, depends how near to saturation the creep forces are.  The larger one of |Y| and
 V |P|/omega is the amplitude, for every wheelset: axles of one frame yaw alike, and the one that
 creeps across moves less.  On the path y' is 0 and the yaw P - i omega Y/V, with the same lateral
-creepage: flanges are not pressed by a velocity that z and roll do not follow.  In curves, where a
-wheelset at its flange hardly moves across, P is i omega Y/V, and so it is for wheelsets that take
-no part.  The contact feels the motion against the rails: what changes in the columns of y and its
-velocity changes in those of elastic rails by half of the opposite each.
+creepage: flanges are not pressed by a velocity that z and roll do not follow.  P is i omega Y/V for
+wheelsets that take no part.  Where no such motion is found, as with wheelsets at their flange in a
+curve, the torque about whose axle has no balance nearby, wheelsets are moved across as slowly as if
+at rest, without yaw and with their spin held, and a remark says so.
+
+The contact feels the motion against the rails: what changes in the columns of y and its velocity
+changes in those of elastic rails by half of the opposite each.
 """
+
+from contextlib import suppress
 
 import numpy as np
 
@@ -45,28 +50,40 @@ ANGLES = 16
 FEWER = 2  # every second one is enough for the means of slopes
 BALANCED = 1e-2  # N and N m, of a wheelset's vertical force, roll moment and axle torque
 MOST_ITERATIONS = 100
-SLOW = 0.1  # ratio of two residuals from which on slopes are formed again
+SLOW = 0.3  # ratio of two residuals from which on slopes are formed again
 STEPS = np.array([1e-8, 1e-8, 1e-5])  # m, rad and rad/s
 LONGEST = np.array([2e-4, 4e-4, 4e-3])  # first step: m, rad, parts of the spin rate
 SHORTER = 0.95  # ratio of the longest steps of two iterations: those across a kink end
 CREEP = 1e-6  # m/s, rad/s and rad, for slopes of the creep forces
 SAME = 1e-2  # change of a motion in parts of the amplitude, below which it is that of the mode
+ONE_MODE = 0.9  # likeness of the hunting modes of two tangents
+AT_REST = 1.0  # rad/s, of wheelsets that move across and do nothing else
 MOST_MOTIONS = 30
-OVERSHOOTS = 3  # motions after which the mean of the last two follows
+OVERSHOOTS = 3  # motions after which only a part of a change follows
 ALIKE = 0.7  # ratio of two modes' marks of hunting above which their damping decides
 LEAST_MARK = 0.02  # of a mode that is hunting
 NO_PART = 1e-6  # of the largest motion across in a mode
 LEAST = 0.3  # part of the amplitude by which a wheelset moves across at least
 
 
-class ContactPath:
-    """Wheelsets moved along their contact path by one amplitude [m]."""
+Hunting = tuple[Complexes, Complexes]  # motion and shape
 
-    def __init__(self, amplitude: float) -> None:
+
+class ContactPath:
+    """Wheelsets moved along their contact path by one amplitude [m].
+
+    `of_tangents`: hunting by the tangents, by speed, which paths of other amplitudes share.
+    """
+
+    def __init__(self, amplitude: float, of_tangents: dict[float, Hunting] | None = None) -> None:
         self.amplitude = amplitude
+        self._of_tangents = {} if of_tangents is None else of_tangents
+        # omega and V P/Y over the speed in the last hunting, and its shape
+        self._hunting: Hunting | None = None
+        self.aside: list[float] = []  # speeds at which no hunting was found [m/s]
         # where the path was found last, and the slopes there: the next motion's are near
-        self._known: dict[int, Floats] = {}
-        self._slopes: dict[int, Floats] = {}
+        self._known: dict[tuple[int, int], Floats] = {}
+        self._slopes: dict[tuple[int, int], Floats] = {}
 
     def matrix(self, vehicle: FreeVehicle, tangent: Floats) -> Floats:
         """Return the matrix of a linearisation with the columns of y and of creepage replaced.
@@ -74,31 +91,64 @@ class ContactPath:
         `tangent`: its tangent matrix. Raises InputError: the contact table is narrower than the
         amplitude.
         """
-        found, before, shape = tangent, None, None
+        with suppress(ModelError):
+            if (found := self._balanced(vehicle, tangent)) is not None:
+                return found
+        turning = np.full(len(vehicle.system.contact.body), 1j * AT_REST)
         try:
-            for number in range(MOST_MOTIONS):
-                motion, shape = _hunting(vehicle, found, shape)
-                if before is not None:
-                    shares = np.array([1.0, *shape.taking_part])
-                    if np.max(shares * np.abs(motion - before)) < SAME * motion[0].real:
-                        return found
-                    motion = before + (motion - before) * min(1.0, OVERSHOOTS / number)
-                before = motion
-                found = self._about(vehicle, tangent, float(motion[0].real), motion[1:])
-            raise ModelError("no hunting in harmonic balance")
+            found = self._about(vehicle, tangent, AT_REST, turning, follow=2)
+            self.aside.append(float(vehicle.state[SPEED]))
+            return found
         except ModelError as error:
             words = f"found {1e3 * self.amplitude:.12g} mm, but {error}"
             raise argument_error("amplitude", words, "a smaller amplitude") from None
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """At which speeds no hunting was found, in words."""
+        if not self.aside:
+            return ()
+        return (
+            f"no hunting of {1e3 * self.amplitude:.4g} mm was found to linearise about at "
+            f"{min(self.aside):.4g} to {max(self.aside):.4g} m/s; there wheelsets are moved across "
+            "without yaw, which at friction 0.2 and less is up to 24 % off in a critical speed",
+        )
+
+    def _balanced(self, vehicle: FreeVehicle, tangent: Floats) -> Floats | None:
+        """The matrix in whose hunting mode wheelsets move as in what it is about, if found."""
+        speed = float(vehicle.state[SPEED])
+        if speed not in self._of_tangents:
+            self._of_tangents[speed] = _hunting(vehicle, tangent, None)
+        motion, shape = self._of_tangents[speed]
+        if self._hunting is not None and _likeness(self._hunting[1], shape) > ONE_MODE:
+            motion, shape = speed * self._hunting[0], self._hunting[1]
+        for number in range(1, MOST_MOTIONS + 1):
+            found = self._about(vehicle, tangent, float(motion[0].real), motion[1:])
+            after, shape = _hunting(vehicle, found, shape)
+            change = np.abs(after - motion)
+            change[1:] *= np.abs(shape[1]) / np.max(np.abs(shape[1]))
+            if np.max(change) < SAME * after[0].real:
+                self._hunting = after / speed, shape
+                return found
+            motion = motion + (after - motion) * min(1.0, OVERSHOOTS / number)
+        return None
+
     def _about(
-        self, vehicle: FreeVehicle, tangent: Floats, omega: float, turning: Complexes
+        self,
+        vehicle: FreeVehicle,
+        tangent: Floats,
+        omega: float,
+        turning: Complexes,
+        follow: int = 3,
     ) -> Floats:
-        """The matrix for a motion of the wheelsets."""
+        """The matrix for a motion of the wheelsets; of z, roll, spin rate so many follow."""
         c, speed = vehicle.coordinates, float(vehicle.state[SPEED])
         place, velocity = c.position_of, c.velocity_of
         bodies = vehicle.system.contact.body
         moving = np.array([[place[b, Y], place[b, YAW], velocity[b, YAW]] for b in bodies])
-        led = np.array([[place[b, Z], place[b, ROLL], velocity[b, PITCH]] for b in bodies])
+        led = np.array([[place[b, Z], place[b, ROLL], velocity[b, PITCH]] for b in bodies])[
+            :, :follow
+        ]
         turns = np.exp(2j * np.pi * (np.arange(ANGLES) + 0.5) / ANGLES)
         y = self.amplitude / np.maximum(1.0, np.abs(turning) / omega)
         yaw = y * np.stack([turning - 1j * omega, 1j * omega * turning]) / speed
@@ -110,11 +160,13 @@ class ContactPath:
             moved[:, w, columns] += given[:, w]
             moved[:, w, others] += poses[:, w]
         share = 2.0 / ANGLES * turns.conj()
-        force, path = (np.tensordot(share, v, 1) for v in (_rates(vehicle, moved), poses))
+        rates = _rates(vehicle, moved)
+        force, path = (np.tensordot(share, values, 1) for values in (rates, poses))
         found = tangent.copy()
         sideways = np.array([velocity[b, Y] for b in bodies])
         for columns in (sideways, *moving.T[1:]):
-            found[:, columns] = _slopes(vehicle, moved[::FEWER], columns).mean(axis=0).T
+            slopes = _slopes(vehicle, moved[::FEWER], rates[::FEWER], columns)
+            found[:, columns] = slopes.mean(axis=0).T
         for w, (columns, others) in enumerate(zip(moving, led, strict=True)):
             left = force[w] - tangent[:, others] @ path[w] - found[:, columns[1:]] @ moves[w, 1:]
             left /= moves[w, 0]
@@ -127,57 +179,54 @@ class ContactPath:
         return found
 
     def _path(self, vehicle: FreeVehicle, moving: Integers, led: Integers, given: Floats) -> Floats:
-        """Return z, roll, spin rate of the wheelsets on their paths, float64[angle, wheelset, 3].
+        """Return what is `led` of the wheelsets on their paths, float64[angle, wheelset, led].
 
         All move at once: none feels another's rails.
         """
-        goal, found = _forces(vehicle, vehicle.x), np.zeros((*given.shape[:2], 3))
+        goal, found = _forces(vehicle, vehicle.x), np.zeros((len(given), *led.shape))
         across, near = given[:, 0, 0], {True: (1.0, found[0]), False: (1.0, found[0])}
         # from the middle outwards: far from its path a wheelset stands on one rail
         for i in np.argsort(np.abs(across), kind="stable").tolist():
             x, (y, pose) = vehicle.x, near[across[i] > 0.0]
             x[moving] += given[i]
-            guess = self._known.get(i, pose * (across[i] / y))
-            found[i] = self._known[i] = self._on_path(vehicle, x, led, i, guess, goal)
+            guess = self._known.get((i, led.shape[1]), pose * (across[i] / y))
+            found[i] = self._known[i, led.shape[1]] = self._on_path(vehicle, x, led, i, guess, goal)
             near[across[i] > 0.0] = across[i], found[i]
         return found
 
     def _on_path(
         self, vehicle: FreeVehicle, x: Floats, led: Integers, angle: int, pose: Floats, goal: Floats
     ) -> Floats:
-        """Return z, roll and spin rate at one angle."""
+        """Return the same at one angle."""
+        n, size = led.shape
+        longest = LONGEST[:size] * np.ones((n, size))
+        longest[:, 2:] *= np.abs(x[led[:, 2:]])
 
         def missing(pose: Floats) -> Floats:
             trial = x.copy()
             trial[led] += pose
-            return _forces(vehicle, trial) - goal
+            return (_forces(vehicle, trial) - goal)[:, :size]
 
-        before, one = np.inf, np.ones(len(led))
+        before, place = np.inf, (angle, size)
         for number in range(MOST_ITERATIONS):
             value = missing(pose)
-            size = float(np.max(np.abs(value)))
-            if size < BALANCED:
+            left = float(np.max(np.abs(value)))
+            if left < BALANCED:
                 return pose
-            if angle not in self._slopes or size > SLOW * before:
-                ends = [[missing(pose + d * e) for d in (1.0, -1.0)] for e in np.diag(STEPS)]
-                slopes = np.stack([a - b for a, b in ends], axis=2) / (2.0 * STEPS)
+            if place not in self._slopes or left > SLOW * before:
+                ends = [[missing(pose + d * e) for d in (1.0, -1.0)] for e in np.diag(STEPS[:size])]
+                slopes = np.stack([a - b for a, b in ends], axis=2) / (2.0 * STEPS[:size])
                 # without friction no torque, off its rails a wheelset has no slopes at all
-                self._slopes[angle] = np.asarray(np.linalg.pinv(slopes, rcond=1e-12), float)
-            step = (self._slopes[angle] @ value[..., None])[..., 0]
-            longest = LONGEST * np.stack([one, one, np.abs(x[led[:, 2]])], axis=1)
+                self._slopes[place] = np.asarray(np.linalg.pinv(slopes, rcond=1e-12), float)
+            step = (self._slopes[place] @ value[..., None])[..., 0]
             excess = np.abs(step) / (longest * SHORTER**number)
             excess[:, :2] = excess[:, :2].max(axis=1, keepdims=True)
             pose = pose - step / np.maximum(1.0, excess)
-            before = size
-        raise ModelError("no contact path")
+            before = left
+        raise ModelError("no height and roll of a wheelset so far aside balance its forces")
 
 
-class S:
-    def __init__(self, shape, taking_part):
-        self.shape, self.taking_part = shape, taking_part
-
-
-def _hunting(vehicle: FreeVehicle, matrix: Floats, before) -> Complexes:
+def _hunting(vehicle: FreeVehicle, matrix: Floats, before: Complexes | None) -> Hunting:
     """Return omega and, of each wheelset, V P/Y in hunting, by a matrix [1/s].
 
     Of all modes that have most of what marks it, wheelsets that move across most of all bodies and
@@ -199,34 +248,37 @@ def _hunting(vehicle: FreeVehicle, matrix: Floats, before) -> Complexes:
     highest = np.max(marks, initial=0.0)
     if highest < LEAST_MARK:
         n = len(bodies)
-        return np.array([speed, *[1j * speed] * n]), S(np.ones(2 * n, complex), np.ones(n))
+        return np.array([speed, *[1j * speed] * n]), np.ones((2, n), complex)
     inside = np.flatnonzero(marks >= ALIKE * highest)
     omega, y, turned = values.imag[inside, None], y[inside], turned[inside]
     # by rounding, wheelsets of another bogie under a held car
     still = np.abs(y) < NO_PART * np.abs(y).max(axis=1, keepdims=True)
-    no_creep = still | (not vehicle.is_straight)
-    turning = np.where(no_creep, 1j * omega, turned / np.where(still, 1.0, y))
+    turning = np.where(still, 1j * omega, turned / np.where(still, 1.0, y))
     turning /= np.maximum(1.0, LEAST / omega * np.abs(turning))
     motions = np.hstack([omega, turning])
     rank = -values.real[inside] / np.abs(values[inside])
-    forms = np.hstack([speed * yaw[inside], 1j * omega * y])
-    forms /= np.linalg.norm(forms, axis=1, keepdims=True)
+    forms = np.stack([turned, 1j * omega * y], axis=1)
     if before is not None:
-        rank = -np.abs(forms @ before.shape.conj())
+        rank = -_likeness(forms, before)
     k = np.argmin(rank)
-    size = np.abs(y[k])
-    return np.asarray(motions[k]), S(forms[k], size / size.max())
+    return motions[k], forms[k]
+
+
+def _likeness(shapes: Complexes, other: Complexes) -> Floats:
+    """Modal assurance criterion of shapes, complex[..., 2, wheelset], 1 at most."""
+    size = np.sum(np.abs(shapes) ** 2, axis=(-2, -1)) * np.sum(np.abs(other) ** 2)
+    return np.asarray(np.abs(np.tensordot(shapes, other.conj(), 2)) ** 2 / size)
 
 
 def _rates(vehicle: FreeVehicle, moved: Floats) -> Floats:
     return vehicle.rates(moved.reshape(-1, len(vehicle.x))).reshape(moved.shape)
 
 
-def _slopes(vehicle: FreeVehicle, moved: Floats, of: Integers) -> Floats:
+def _slopes(vehicle: FreeVehicle, moved: Floats, rates: Floats, of: Integers) -> Floats:
     """Derivatives of the rates with respect to a coordinate of each wheelset, as `moved`."""
     step = np.zeros(moved.shape[1:])
     step[np.arange(len(of)), of] = CREEP
-    return (_rates(vehicle, moved + step) - _rates(vehicle, moved - step)) / (2.0 * CREEP)
+    return (_rates(vehicle, moved + step) - rates) / CREEP
 
 
 def _forces(vehicle: FreeVehicle, x: Floats) -> Floats:

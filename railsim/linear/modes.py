@@ -418,6 +418,6 @@ def _with_names(
         largest_first = np.argsort(-energy, kind="stable")
         shares = {moving[j]: float(energy[j]) for j in largest_first if energy[j] >= LEAST_SHARE}
         listed.append(Mode(name_of[k], complex(value), shares, shapes))
-    remarks = (*linear.remarks, *divergence(parts, found))
+    remarks = (*linear.remarks, *linear.path_remarks, *divergence(parts, found))
     about = remarks, parameter, linear.name, linear.place
     return Modes(speed, linear.contact, tuple(listed), *about)

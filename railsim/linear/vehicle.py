@@ -200,6 +200,11 @@ class LinearVehicle:
         where = conditions(self.track, Settings())
         return f"{shape}, rails {where['rails']}, friction {where['friction']}"
 
+    @property
+    def path_remarks(self) -> tuple[str, ...]:
+        """Where the linearisation about an amplitude is not about hunting, in words."""
+        return self._path.remarks if self._path else ()
+
     def steady(self, speed: float) -> Floats:
         """Return the state of steady rolling at a speed [m/s]; raises ModelError: there is none."""
         if speed not in self._known and self._known:

@@ -14,7 +14,7 @@ from railsim.definitions.loading import load_running_limits, load_track
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Faults, InputError, ModelError
 from railsim.linear.eigenmodes import SEARCHED, Eigenmodes, eigenmodes, oscillations
-from railsim.linear.harmonic import ContactPath
+from railsim.linear.harmonic import ContactPath, Hunting
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import divergence, mode_name, parts_of
 from railsim.linear.stability_loss import LossOfStability, loss_of_stability
@@ -122,15 +122,17 @@ def critical_speed(
     result.remarks += smooth.remarks
     result.conicity_over_amplitude = conicity_over_amplitude(smooth)
     result.linear, stuck = _linear(result, smooth)
+    result.remarks += smooth.path_remarks
     tell = progress or (lambda _: None)
     tell(0.02)
     if over_amplitude:
-        result.linear_over_amplitude = _over_amplitude(smooth, low, high)
+        result.linear_over_amplitude = _over_amplitude(smooth, result)
         if result.linear is not None and smooth.system.support.elastic:
             try:
                 rigid = linear_vehicle(law, contact, track.replace(support={"preset": "rigid"}))
                 lost = _loss_of_hunting(rigid, low, high)
                 result.linear = replace(result.linear, speed_on_rigid_rails=lost.parameter)
+                result.remarks += [f"on rigid rails: {one}" for one in rigid.path_remarks]
                 if lost.parameter is None:
                     words = f"unstable at {low:g}" if lost.already else f"stable up to {high:g}"
                     result.remarks.append(f"on rigid rails: {words} m/s")
@@ -297,14 +299,17 @@ def _stable_again(linear: LinearVehicle, lost: float, high: float) -> list[str]:
     ]
 
 
-def _over_amplitude(linear: LinearVehicle, low: float, high: float) -> OverAmplitude:
+def _over_amplitude(linear: LinearVehicle, result: CriticalSpeed) -> OverAmplitude:
     """Linear critical speeds with harmonic linearisation, up to the width of the contact table."""
-    found = OverAmplitude()
+    found, low, high = OverAmplitude(), result.low, result.high
+    of_tangents: dict[float, Hunting] = {}
     for amplitude in AMPLITUDES:
+        path = ContactPath(amplitude, of_tangents)
         try:
-            lost = _loss_of_hunting(linear, low, high, ContactPath(amplitude))
+            lost = _loss_of_hunting(linear, low, high, path)
         except InputError:
             break
+        result.remarks += path.remarks
         critical = lost.modes[0] if lost.parameter is not None else None
         found.amplitude.append(amplitude)
         found.speed.append(low if lost.already else lost.parameter)
