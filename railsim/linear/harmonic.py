@@ -26,9 +26,9 @@ above all, depends how near to saturation the creep forces are.  The larger one 
 V |P|/omega is the amplitude, for every wheelset: axles of one frame yaw alike, and the one that
 creeps across moves less.  On the path y' is 0 and the yaw P - i omega Y/V, with the same lateral
 creepage: flanges are not pressed by a velocity that z and roll do not follow.  P is i omega Y/V for
-wheelsets that take no part.  Where no such motion is found, as with wheelsets at their flange in a
-curve, the torque about whose axle has no balance nearby, wheelsets are moved across as slowly as if
-at rest, without yaw and with their spin held, and a remark says so.
+wheelsets that take no part.  Where no such motion is found, and in curves where a wheel runs on its
+flange, the torque about whose axle has no balance nearby, wheelsets are moved across as slowly as
+if at rest, without yaw and with their spin held, and a remark says so.
 
 The contact feels the motion against the rails: what changes in the columns of y and its velocity
 changes in those of elastic rails by half of the opposite each.
@@ -40,6 +40,7 @@ import numpy as np
 
 from railsim.arrays import Complexes, Floats, Integers
 from railsim.errors import ModelError, argument_error
+from railsim.kernels.contact_columns import ANGLE_SIN, NORMAL
 from railsim.kernels.state import SPEED
 from railsim.kernels.support import RAIL_DOF
 from railsim.linear.coordinates import FreeVehicle
@@ -57,6 +58,7 @@ SHORTER = 0.95  # ratio of the longest steps of two iterations: those across a k
 CREEP = 1e-6  # m/s, rad/s and rad, for slopes of the creep forces
 SAME = 1e-2  # change of a motion in parts of the amplitude, below which it is that of the mode
 ONE_MODE = 0.9  # likeness of the hunting modes of two tangents
+FLANGE = 0.25  # sine of the contact angle from which a wheel runs on its flange
 AT_REST = 1.0  # rad/s, of wheelsets that move across and do nothing else
 MOST_MOTIONS = 30
 OVERSHOOTS = 3  # motions after which only a part of a change follows
@@ -92,7 +94,8 @@ class ContactPath:
         amplitude.
         """
         with suppress(ModelError):
-            if (found := self._balanced(vehicle, tangent)) is not None:
+            found = None if _on_flange(vehicle) else self._balanced(vehicle, tangent)
+            if found is not None:
                 return found
         turning = np.full(len(vehicle.system.contact.body), 1j * AT_REST)
         try:
@@ -268,6 +271,14 @@ def _likeness(shapes: Complexes, other: Complexes) -> Floats:
     """Modal assurance criterion of shapes, complex[..., 2, wheelset], 1 at most."""
     size = np.sum(np.abs(shapes) ** 2, axis=(-2, -1)) * np.sum(np.abs(other) ** 2)
     return np.asarray(np.abs(np.tensordot(shapes, other.conj(), 2)) ** 2 / size)
+
+
+def _on_flange(vehicle: FreeVehicle) -> bool:
+    """Whether a wheel runs on its flange in steady rolling."""
+    patch = vehicle.work.patch
+    patch[NORMAL] = 0.0  # of patches that are no longer there
+    vehicle.evaluate(vehicle.state)
+    return bool(np.any((patch[NORMAL] > 0.0) & (np.abs(patch[ANGLE_SIN]) > FLANGE)))
 
 
 def _rates(vehicle: FreeVehicle, moved: Floats) -> Floats:
