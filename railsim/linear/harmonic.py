@@ -163,13 +163,11 @@ class ContactPath:
             moved[:, w, columns] += given[:, w]
             moved[:, w, others] += poses[:, w]
         share = 2.0 / ANGLES * turns.conj()
-        rates = _rates(vehicle, moved)
-        force, path = (np.tensordot(share, values, 1) for values in (rates, poses))
+        force, path = (np.tensordot(share, v, 1) for v in (_rates(vehicle, moved), poses))
         found = tangent.copy()
         sideways = np.array([velocity[b, Y] for b in bodies])
         for columns in (sideways, *moving.T[1:]):
-            slopes = _slopes(vehicle, moved[::FEWER], rates[::FEWER], columns)
-            found[:, columns] = slopes.mean(axis=0).T
+            found[:, columns] = _slopes(vehicle, moved[::FEWER], columns).mean(axis=0).T
         for w, (columns, others) in enumerate(zip(moving, led, strict=True)):
             left = force[w] - tangent[:, others] @ path[w] - found[:, columns[1:]] @ moves[w, 1:]
             left /= moves[w, 0]
@@ -285,11 +283,11 @@ def _rates(vehicle: FreeVehicle, moved: Floats) -> Floats:
     return vehicle.rates(moved.reshape(-1, len(vehicle.x))).reshape(moved.shape)
 
 
-def _slopes(vehicle: FreeVehicle, moved: Floats, rates: Floats, of: Integers) -> Floats:
+def _slopes(vehicle: FreeVehicle, moved: Floats, of: Integers) -> Floats:
     """Derivatives of the rates with respect to a coordinate of each wheelset, as `moved`."""
     step = np.zeros(moved.shape[1:])
     step[np.arange(len(of)), of] = CREEP
-    return (_rates(vehicle, moved + step) - rates) / CREEP
+    return (_rates(vehicle, moved + step) - _rates(vehicle, moved - step)) / (2.0 * CREEP)
 
 
 def _forces(vehicle: FreeVehicle, x: Floats) -> Floats:
