@@ -57,7 +57,6 @@ LONGEST = np.array([2e-4, 4e-4, 4e-3])  # first step: m, rad, parts of the spin 
 SHORTER = 0.95  # ratio of the longest steps of two iterations: those across a kink end
 CREEP = 1e-6  # m/s, rad/s and rad, for slopes of the creep forces
 SAME = 1e-2  # change of a motion in parts of the amplitude, below which it is that of the mode
-ONE_MODE = 0.9  # likeness of the hunting modes of two tangents
 FLANGE = 0.25  # sine of the contact angle from which a wheel runs on its flange
 AT_REST = 1.0  # rad/s, of wheelsets that move across and do nothing else
 MOST_MOTIONS = 30
@@ -68,20 +67,11 @@ NO_PART = 1e-6  # of the largest motion across in a mode
 LEAST = 0.3  # part of the amplitude by which a wheelset moves across at least
 
 
-Hunting = tuple[Complexes, Complexes]  # motion and shape
-
-
 class ContactPath:
-    """Wheelsets moved along their contact path by one amplitude [m].
+    """Wheelsets moved along their contact path by one amplitude [m]."""
 
-    `of_tangents`: hunting by the tangents, by speed, which paths of other amplitudes share.
-    """
-
-    def __init__(self, amplitude: float, of_tangents: dict[float, Hunting] | None = None) -> None:
+    def __init__(self, amplitude: float) -> None:
         self.amplitude = amplitude
-        self._of_tangents = {} if of_tangents is None else of_tangents
-        # omega and V P/Y over the speed in the last hunting, and its shape
-        self._hunting: Hunting | None = None
         self.aside: list[float] = []  # speeds at which no hunting was found [m/s]
         # where the path was found last, and the slopes there: the next motion's are near
         self._known: dict[tuple[int, int], Floats] = {}
@@ -119,19 +109,13 @@ class ContactPath:
 
     def _balanced(self, vehicle: FreeVehicle, tangent: Floats) -> Floats | None:
         """The matrix in whose hunting mode wheelsets move as in what it is about, if found."""
-        speed = float(vehicle.state[SPEED])
-        if speed not in self._of_tangents:
-            self._of_tangents[speed] = _hunting(vehicle, tangent, None)
-        motion, shape = self._of_tangents[speed]
-        if self._hunting is not None and _likeness(self._hunting[1], shape) > ONE_MODE:
-            motion, shape = speed * self._hunting[0], self._hunting[1]
+        motion, shape = _hunting(vehicle, tangent, None)
         for number in range(1, MOST_MOTIONS + 1):
             found = self._about(vehicle, tangent, float(motion[0].real), motion[1:])
             after, shape = _hunting(vehicle, found, shape)
             change = np.abs(after - motion)
             change[1:] *= np.abs(shape[1]) / np.max(np.abs(shape[1]))
             if np.max(change) < SAME * after[0].real:
-                self._hunting = after / speed, shape
                 return found
             motion = motion + (after - motion) * min(1.0, OVERSHOOTS / number)
         return None
@@ -149,9 +133,8 @@ class ContactPath:
         place, velocity = c.position_of, c.velocity_of
         bodies = vehicle.system.contact.body
         moving = np.array([[place[b, Y], place[b, YAW], velocity[b, YAW]] for b in bodies])
-        led = np.array([[place[b, Z], place[b, ROLL], velocity[b, PITCH]] for b in bodies])[
-            :, :follow
-        ]
+        led = np.array([[place[b, Z], place[b, ROLL], velocity[b, PITCH]] for b in bodies])
+        led = led[:, :follow]
         turns = np.exp(2j * np.pi * (np.arange(ANGLES) + 0.5) / ANGLES)
         y = self.amplitude / np.maximum(1.0, np.abs(turning) / omega)
         yaw = y * np.stack([turning - 1j * omega, 1j * omega * turning]) / speed
@@ -227,12 +210,14 @@ class ContactPath:
         raise ModelError("no height and roll of a wheelset so far aside balance its forces")
 
 
-def _hunting(vehicle: FreeVehicle, matrix: Floats, before: Complexes | None) -> Hunting:
-    """Return omega and, of each wheelset, V P/Y in hunting, by a matrix [1/s].
+def _hunting(
+    vehicle: FreeVehicle, matrix: Floats, before: Complexes | None
+) -> tuple[Complexes, Complexes]:
+    """Return omega and, of each wheelset, V P/Y in hunting, by a matrix [1/s], and its shape.
 
     Of all modes that have most of what marks it, wheelsets that move across most of all bodies and
     roll as they do so, with a yaw angle of y'/V, it is the least damped one, or the most like the
-    motion `before`.  |V P/Y| is omega / `LEAST` at most.  Where nothing hunts, such as without
+    shape `before`.  |V P/Y| is omega / `LEAST` at most.  Where nothing hunts, such as without
     friction, wheelsets roll by 1 rad/m.
     """
     place, linear = vehicle.coordinates.position_of, vehicle.linearisation(matrix)

@@ -14,7 +14,7 @@ from railsim.definitions.loading import load_running_limits, load_track
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Faults, InputError, ModelError
 from railsim.linear.eigenmodes import SEARCHED, Eigenmodes, eigenmodes, oscillations
-from railsim.linear.harmonic import ContactPath, Hunting
+from railsim.linear.harmonic import ContactPath
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import divergence, mode_name, parts_of
 from railsim.linear.stability_loss import LossOfStability, loss_of_stability
@@ -302,9 +302,8 @@ def _stable_again(linear: LinearVehicle, lost: float, high: float) -> list[str]:
 def _over_amplitude(linear: LinearVehicle, result: CriticalSpeed) -> OverAmplitude:
     """Linear critical speeds with harmonic linearisation, up to the width of the contact table."""
     found, low, high = OverAmplitude(), result.low, result.high
-    of_tangents: dict[float, Hunting] = {}
     for amplitude in AMPLITUDES:
-        path = ContactPath(amplitude, of_tangents)
+        path = ContactPath(amplitude)
         try:
             lost = _loss_of_hunting(linear, low, high, path)
         except InputError:
