@@ -21,6 +21,7 @@ LETTERS = ("y", "z", "cross_level", "gauge")  # columns of a recording
 MILLI, KILO = 1e3, 1e-3
 LISTED, NEAR = 8, 10.0  # ranges in a sentence; flanges touch no farther apart at one place [m]
 SEEN = 0.5  # share of the variance that the channels explain, below which nothing is filled in
+ENDS = 60.0  # of a record, where deviations are larger than those of all of it [m]
 FILES = ("recording.csv", "track.toml", "estimates.csv", "forces.csv")
 
 
@@ -115,16 +116,18 @@ class Irregularity(Estimated):
         return Table(columns, rows)
 
     def forces_table(self) -> Table:
-        """Return largest wheel forces, and the standard deviations of their errors."""
+        """Return largest wheel forces away from the ends, and the deviations of their errors."""
         columns = [Column("force"), Column("largest", "largest magnitude", "kN", ".2f"),
                    Column("place", "at s", "m", ".0f"),
                    Column("rms", "rms about the mean", "kN", ".2f"),
                    Column("deviation", "standard deviation of the error", "kN", ".2f")]  # fmt: skip
         rows = []
+        inside = np.flatnonzero((self.s >= self.s[0] + ENDS) & (self.s <= self.s[-1] - ENDS))
         for name, values, rest in self._forces():
             if not name.startswith("lateral"):
-                k = int(np.argmax(np.abs(values)))
-                rows.append([name, abs(float(values[k])), float(self.s[k]), float(values.std()),
+                k = inside[int(np.argmax(np.abs(values[inside])))]
+                rows.append([name, abs(float(values[k])), float(self.s[k]),
+                             float(values[inside].std()),
                              float(rest.mean())])  # fmt: skip
         return Table(columns, rows)
 
@@ -272,9 +275,14 @@ def join_pieces(
         lateral = whole.forces[whole.outputs.index(f"lateral.{w + 1}")]
         places = [(s[a], s[b - 1]) for a, b in stretches(np.abs(lateral) > clearance)]
         touching += [(w + 1, float(a), float(b)) for a, b in _merge_ranges(places, 1.0, NEAR)]
+    ends = (
+        f"Within {ENDS:g} m of the ends, before s = {begin + ENDS:.0f} m and beyond "
+        f"{end - ENDS:.0f} m, errors are larger than their standard deviations say; the table of "
+        "forces leaves these lengths out."
+    )
     return Irregularity(
         **vars(whole), name=name, vehicle=vehicle, pieces=tuple(pieces), flanges=tuple(touching),
-        remarks=tuple(dict.fromkeys(remarks)), track=track,
+        remarks=tuple(dict.fromkeys([*remarks, ends])), track=track,
     )  # fmt: skip
 
 

@@ -26,6 +26,8 @@ ALIKE, UNLIKE = 0.3, 3.0  # correlation, ratio of rms values: read, and said by 
 BEYOND = 30.0  # power of what does not agree, over that which noise and model explain
 RESTS = 1e-9  # size over that of the channel that moves most
 FEWEST = 3  # channels of which one can be wrong
+CLEAR = 1.1  # wave numbers over the largest that is assumed, from which on waves count as shorter
+SHORT, SHARE = 10.0, 0.0025  # power in them, over that of the noise; over that of the channel
 MODEL = 0.03  # error of the response over its rms, before the data are asked
 KINDS = ((0, 3), (1, 2))  # components of a wheelset whose unknown accelerations have one size
 STEPS = 30
@@ -98,6 +100,30 @@ def spectra_of(signals: Floats, valid: Flags, points: int) -> Complexes:
     size = np.sqrt(np.sum(window**2, axis=1, keepdims=True) / points)
     spectra = np.fft.rfft((signals - means) * window, points, axis=1)
     return np.asarray(spectra / np.where(size > 0.0, size, 1.0))
+
+
+def shorter_waves(
+    powers: Powers, piece: Piece, signals: Floats, names: list[str], chosen: list[bool]
+) -> list[str]:
+    """Remark where chosen channels without gaps read waves shorter than those that are assumed.
+
+    What they read there is held against their noise, and against all that they read.
+    """
+    power = np.abs(spectra_of(signals, piece.valid, powers.points)) ** 2 / powers.points
+    last = np.flatnonzero(powers.track.any(axis=1))[-1]
+    short = slice(int(CLEAR * last), int(2 / 3 * len(powers.track)))
+    read, noise = power[:, short].sum(axis=1), powers.white[short].sum(axis=0)
+    far = piece.valid.all(axis=1) & chosen & (read > SHORT * noise)
+    far &= read > SHARE * power.sum(axis=1)
+    if not far.any():
+        return []
+    c = int(np.argmax(np.where(far, read / noise, 0.0)))
+    shortest = 2.0 * STEP * (len(powers.track) - 1) / last
+    return [
+        f"Channels read waves shorter than the {shortest:.3g} m that are assumed: {names[c]} "
+        f"{np.sqrt(read[c] / noise[c]):.2g} times its noise. They are in no interval, and no force "
+        "has them; 'wavelengths' takes those down to 1 m."
+    ]
 
 
 def level_of(powers: Powers, spectra: Complexes) -> float:

@@ -252,6 +252,14 @@ def test_level_cross_level_and_wheel_forces_of_a_twin(short):
     assert rms(error) < 0.3 * true.std()
 
 
+def test_waves_shorter_than_those_assumed_are_said(short, coach):
+    """Waves of 2.5 m beside those assumed: 95 % intervals of Q covered 39 %, without a word."""
+    *_, plain = short
+    _, track, read = twin(coach, 400.0, V, points=("axlebox",), wavelengths=[2.0, 70.0])
+    said = [irregularity(read, coach, track, simulations=0).remarks, plain.remarks]
+    assert ["waves shorter than the 3 m" in " ".join(remarks) for remarks in said] == [True, False]
+
+
 @points("filters", [{"low_pass": 40.0}, {"high_pass": 0.5}], always=(0,))
 def test_filters_of_the_amplifier_do_not_move_the_track(short, coach, filters):
     """40 Hz lags by 0.5 m at 50 m/s, 0.5 Hz turns waves of 60 m round: both are in the model."""
