@@ -318,7 +318,7 @@ def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
     changes: dict[str, Any] = {"irregularities": [p.model_dump(exclude_none=True) for p in parts]}
     changes["mileage"] = float(track.mileage_at(moved))
     if uniform:
-        changes |= even_line(min(high, track.length) - moved)
+        changes |= even_line(high - moved)  # beyond the end of the track too, for the filters
     return track.replace(**changes), moved
 
 

@@ -127,7 +127,10 @@ def test_a_floor_is_judged_in_the_band_of_its_limit():
 def test_runs_go_on_behind_their_pieces_until_the_band_pass_has_forgotten_their_end(
     recording, tmp_path, monkeypatch
 ):
-    """A tone of 0.5 Hz at the end of a record comes out of the filter wrong by up to 94 %."""
+    """A tone of 0.5 Hz at the end of a record comes out of the filter wrong by up to 94 %.
+
+    A coach read 1.05 of a limit in the last 15 m of a record whose run ended with it, 0.82 else.
+    """
     found = []
 
     def catch(cases, *_, **__):
@@ -138,10 +141,10 @@ def test_runs_go_on_behind_their_pieces_until_the_band_pass_has_forgotten_their_
     monkeypatch.setattr(module, "carry_out_cases", catch)
     with pytest.raises(InterruptedError):
         assess_track(recording, ["coach_manchester"], [20.0, SPEED], out=tmp_path / "x")
-    last_axle, edge = 10.78, 0.5 * (LENGTH - 0.25)
+    last_axle, end = 10.78, LENGTH - 0.25
     time = np.arange(0.0, 40.0, 1.0 / module.RATE)
-    for case in found[:2]:
-        after = (case.until - edge - last_axle) / case.speed
+    for case, edge in zip(found, [0.5 * end] * 2 + [end] * 2, strict=True):
+        after = (case.until + case.track.mileage - edge - last_axle) / case.speed
         cut = int((20.0 + after) * module.RATE)
         for phase in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False):
             tone = 1.3 + np.sin(np.pi * time + phase)
@@ -149,8 +152,6 @@ def test_runs_go_on_behind_their_pieces_until_the_band_pass_has_forgotten_their_
                 in_band(x, module.RATE, RIDE_BAND)[1000:2000] for x in (tone, tone[:cut])
             )
             assert part == pytest.approx(whole, abs=0.025)
-    for case in found[2:]:
-        assert case.until == pytest.approx(case.track.length)
 
 
 def test_pieces_say_what_one_run_says(judged, recording, tmp_path):
