@@ -103,7 +103,7 @@ def spectra_of(signals: Floats, valid: Flags, points: int) -> Complexes:
 
 
 def shorter_waves(
-    powers: Powers, piece: Piece, signals: Floats, names: list[str], chosen: list[bool]
+    powers: Powers, piece: Piece, signals: Floats, names: list[str], chosen: Flags
 ) -> list[str]:
     """Remark where chosen channels without gaps read waves shorter than those that are assumed.
 

@@ -339,7 +339,7 @@ class _Smooth:
                 allowed = f"1/{LEVEL:g} to {LEVEL:g} times; the 'unit' of all channels, or 'scale'?"
                 raise input_error(self.name, found, allowed, "channels")
             self._wrong, said = innovations.disagreeing_channels(powers, piece, read, self.channels)
-            vertical = [name.endswith(".z") for name in self.used]  # flanges make short waves in y
+            vertical = np.char.endswith(self.used, ".z")  # flanges make short waves in y
             said += innovations.shorter_waves(powers, piece, read, self.channels, vertical)
             self.remarks += said
         valid = piece.valid.copy()
