@@ -286,6 +286,21 @@ def join_pieces(
     )  # fmt: skip
 
 
+def lengths_without_values(pieces: Sequence[Piece]) -> Iterator[str]:
+    """Remark on lengths of which no channel says anything."""
+    ends = [
+        (float(piece.grid[a]), float(piece.grid[b - 1]))
+        for piece in pieces
+        for a, b in stretches(~piece.valid.any(axis=0))
+    ]
+    if ends:
+        places = [f"{a:.0f} to {b:.0f}" for a, b in _merge_ranges(sorted(ends), 1.0)]
+        yield (
+            f"No channel has values at s = {_list_text(places, 'places')}: errors there, and of "
+            "wheelsets that run there, are larger than their standard deviations say."
+        )
+
+
 def _share(piece: Estimate, number: int, band: tuple[float, float]) -> float:
     """Share of the assumed variance in a band that the channels explain; nan without any."""
     k = piece.wave_numbers

@@ -34,7 +34,14 @@ from railsim.measurement.alignment import CURVATURES
 from railsim.measurement.counterpart import amplifier
 from railsim.observation import innovations
 from railsim.observation.contact import Noise, with_mean_contact
-from railsim.observation.estimate import Estimate, Irregularity, estimate_of, join_pieces, rms
+from railsim.observation.estimate import (
+    Estimate,
+    Irregularity,
+    estimate_of,
+    join_pieces,
+    lengths_without_values,
+    rms,
+)
 from railsim.observation.innovations import KINDS, Powers, Sizes, likely_sizes, spectra_of
 from railsim.observation.pieces import MARGIN, READ, STEP, Piece, pieces_of, used_channels
 from railsim.observation.simulated import CHANGE, SimulatedRun, refine
@@ -132,6 +139,7 @@ def irregularity(
         remarks.append(f"Not used: {', '.join(unused)}; the smoother reads accelerations.")
     remarks += _other_curves(track, measurement, used)
     pieces = pieces_of(measurement, list(used))
+    remarks += lengths_without_values(pieces)
     begin, end = measurement.distance[[0, -1]].tolist()
     if not is_uniform(track) and (begin < -MARGIN or end > track.length + MARGIN):
         found, allowed = f"{begin:.0f} to {end:.0f} m", f"0 to {track.length:.0f} m"

@@ -351,6 +351,17 @@ def test_files_hold_all_estimates_and_forces_in_their_units(short, tmp_path):
 
 
 @pytest.mark.further
+def test_lengths_of_which_no_channel_says_anything_are_named(short, coach):
+    """Q was wrong there by twelve standard deviations after 50 m, without a word."""
+    _, track, read, plain = short
+    lost = (read.distance > 250.0) & (read.distance < 290.0)
+    channels = {name: np.where(lost, np.nan, x) for name, x in read.channels.items()}
+    found = irregularity(replace(read, channels=channels), coach, track, simulations=0)
+    # with the steps beside a gap that are left out
+    assert any("No channel has values at s = 248 to 292 m" in words for words in found.remarks)
+    assert not any("No channel" in words for words in plain.remarks)
+
+
 def test_gaps_signs_and_units(short, coach):
     """A gap of 40 m hardly matters; wrong signs and units and a dead sensor are said."""
     _, track, measurement, _ = short
