@@ -291,7 +291,7 @@ def lengths_without_values(pieces: Sequence[Piece]) -> Iterator[str]:
     ends = [
         (float(piece.grid[a]), float(piece.grid[b - 1]))
         for piece in pieces
-        for a, b in stretches(~piece.valid.any(axis=0))
+        for a, b in stretches(np.asarray(~piece.valid.any(axis=0)))
     ]
     if ends:
         places = [f"{a:.0f} to {b:.0f}" for a, b in _merge_ranges(sorted(ends), 1.0)]
