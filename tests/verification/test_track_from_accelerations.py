@@ -350,7 +350,6 @@ def test_files_hold_all_estimates_and_forces_in_their_units(short, tmp_path):
             assert np.allclose(column, expected[name], rtol=1e-4, atol=2e-5)
 
 
-@pytest.mark.further
 def test_lengths_of_which_no_channel_says_anything_are_named(short, coach):
     """Q was wrong there by twelve standard deviations after 50 m, without a word."""
     _, track, read, plain = short
@@ -362,6 +361,7 @@ def test_lengths_of_which_no_channel_says_anything_are_named(short, coach):
     assert not any("No channel" in words for words in plain.remarks)
 
 
+@pytest.mark.further
 def test_gaps_signs_and_units(short, coach):
     """A gap of 40 m hardly matters; wrong signs and units and a dead sensor are said."""
     _, track, measurement, _ = short
