@@ -31,6 +31,7 @@ from railsim.stability.ramp import (
     SMALL,
     Progress,
     below,
+    far_above,
     lasts_in_shorter_steps,
     ramp,
     tops_above,
@@ -345,7 +346,7 @@ def _by_ramp(
     result.nonlinear["ramp"] = lowest  # kept if a further one leaves the rails
     unstable = result.low if begins.already else begins.parameter
     end = result.high if lowest is None else lowest.speed
-    above = (v for v in (stuck, unstable) if v and end > (v if v is stuck else _far_above(v)))
+    above = (v for v in (stuck, unstable) if v and end > (v if v is stuck else far_above(v)))
     for at in sorted(above):  # the sway of stuck friction is another motion, however near
         # hunting dies above speeds at which rest is unstable: what it becomes there is sought too
         for top in (tops := tops_above(at, end)):
@@ -377,11 +378,6 @@ def _after(excitations: Sequence[float]) -> str:
     """Say what was tried: another disturbance may end in hunting."""
     size = 1e3 * max(excitations)
     return f"after disturbances of up to {size:g} mm in the shape of the hunting mode"
-
-
-def _far_above(speed: float) -> float:
-    """Speed above which hunting does not begin where rest loses its stability [m/s]."""
-    return max(speed + 2.0, 1.05 * speed)
 
 
 def _by_diagram(
@@ -462,7 +458,7 @@ def _conclude(
         )
     if lowest is None:
         result.type = "" if already or at is not None else "none"
-    elif already or (at is not None and lowest.speed > _far_above(at)):
+    elif already or (at is not None and lowest.speed > far_above(at)):
         result.type = result.onset
     elif at is None or lowest.speed < at - RESOLUTION or result.onset == "subcritical":
         result.type = "subcritical"

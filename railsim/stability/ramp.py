@@ -137,6 +137,11 @@ def tops_above(speed: float, end: float) -> list[float]:
     return [speed + share * reach for share in ONWARDS]
 
 
+def far_above(speed: float) -> float:
+    """Speed above which hunting does not begin where rest loses its stability [m/s]."""
+    return max(speed + 2.0, 1.05 * speed)
+
+
 def below(
     motion: Motion, speed: float, low: float, excitation: float
 ) -> Iterator[tuple[Point, Branch]]:
