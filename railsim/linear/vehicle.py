@@ -207,6 +207,10 @@ class LinearVehicle:
 
     def steady(self, speed: float) -> Floats:
         """Return the state of steady rolling at a speed [m/s]; raises ModelError: there is none."""
+        straight = not self.curvature and not self.cant
+        if speed not in self._known and self.held and straight:  # as at rest, whatever rolls
+            solver = SteadyRolling(self.model, self.system, held=True)
+            self._known[speed] = solver.solve(self._rest, speed)
         if speed not in self._known and self._known:
             near = min(self._known, key=lambda v: abs(v - speed))
             solver = SteadyRolling(self.model, self.system)
