@@ -2,6 +2,7 @@
 
 import pickle
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, get_args
@@ -95,7 +96,7 @@ class FileDefinition(Definition):
         """Return a copy with top-level keys replaced, validated again; raises `InputError`."""
         copy = type(self)(**{**self.model_dump(exclude_none=True), **changes})
         if faults := copy.contradictions():
-            raise InputError(faults)
+            raise InputError(replace(one, file=one.file or self.KIND) for one in faults)
         return copy.settled()
 
     def with_values(self, values: Mapping[str, Any]) -> Self:

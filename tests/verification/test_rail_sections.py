@@ -265,5 +265,5 @@ def test_ranges_of_a_rail_that_overlap_are_refused(rail, begin, faults):
     try:
         track.replace(sections=[part, {**part, "rail": rail, "begin": begin, "end": 51.0}])
     except InputError as error:
-        found = [f"{fault.key}: {fault.found}" for fault in error.faults]
-    assert found == ["sections.1: 50.2 to 51 m, within the range of sections.0"] * faults
+        found = [f"{fault.file}: {fault.key}: {fault.found}" for fault in error.faults]
+    assert found == ["track: sections.1: 50.2 to 51 m, within the range of sections.0"] * faults
