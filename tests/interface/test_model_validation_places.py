@@ -267,17 +267,22 @@ def test_every_value_measured_and_simulated_is_that_of_its_filtered_tones(turn):
             assert values == pytest.approx(wanted[key], rel=4e-3, abs=near), key
 
 
-@pytest.mark.parametrize("dies", [0.0, 700.0])
-def test_sections_in_which_a_channel_rests_are_counted_and_left_out(dies):
-    """One wheel's load rests from `dies` on, the other's does not: that one has all sections."""
-    on = track(*curve(300.0, 900.0), cant=0.12)
-    result = made(
+def equally_loaded(on):
+    """A result in which all wheels have the same load, low-passed at 80 Hz."""
+    return made(
         on,
         SPEED,
         rate=RATE,
         Q=lambda t, s: np.tile(load(t)[:, None, None], (1, 4, 2)),
         settings='{"outputs": {"low_pass": {"frequency": 80.0}}, "output_rate": 200.0}',
     )
+
+
+@pytest.mark.parametrize("dies", [0.0, 700.0])
+def test_sections_in_which_a_channel_rests_are_counted_and_left_out(dies):
+    """One wheel's load rests from `dies` on, the other's does not: that one has all sections."""
+    on = track(*curve(300.0, 900.0), cant=0.12)
+    result = equally_loaded(on)
     t = np.arange(round(on.length / SPEED * RATE)) / RATE
     how = MeasurementFile.model_validate(
         {
@@ -352,13 +357,7 @@ def test_sections_lie_where_channel_and_reference_body_have_both_been(wheelset, 
     The leading one was nowhere in the first 10.78 m, the trailing one not in the last ones.
     """
     on = track(*curve(300.0, 1000.0), cant=0.12)
-    result = made(
-        on,
-        SPEED,
-        rate=RATE,
-        Q=lambda t, s: np.tile(load(t)[:, None, None], (1, 4, 2)),
-        settings='{"outputs": {"low_pass": {"frequency": 80.0}}, "output_rate": 200.0}',
-    )
+    result = equally_loaded(on)
     first, last = (round(s / SPEED * RATE) for s in (250.0, 250.0 + 8.0 * 70.0 + over))
     t = np.arange(first, last + 1) / RATE
     how = MeasurementFile.model_validate(
