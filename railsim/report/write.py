@@ -1,6 +1,6 @@
 """One page about result files, folders of studies, comparisons with tests and wear."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from railsim.assessment.assessment import Assessment
@@ -60,11 +60,15 @@ def write_report(
     >>> railsim.write_report("curves", "curves.html")  # doctest: +SKIP
     """
     target = Path(path)
-    names = [str(file) for file in ([files] if isinstance(files, str | Path) else files)]
+    each = list(files) if isinstance(files, Iterable) and not isinstance(files, str) else [files]
     faults = Faults()
-    faults.require(names, "files", "none", "a result file or a folder at least")
+    faults.require(each, "files", "none", "a result file or a folder at least")
+    for file in each:
+        allowed = "the path of a result file, or the folder of a study"
+        faults.require(isinstance(file, str | Path), "files", f"found {file!r}", allowed)
     faults.require(1 <= curves <= MOST_CURVES, "curves", f"found {curves}", f"1 to {MOST_CURVES}")
     faults.check()
+    names = [str(file) for file in each]
     check_file(target, overwrite=overwrite, endings=ENDINGS)
     parts = [read_part(name) for name in names if is_measured(name)]
     names = [name for name in names if not is_measured(name)]

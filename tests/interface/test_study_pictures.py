@@ -155,6 +155,8 @@ def test_python_draws_and_reports_what_the_command_does(folder, tmp_path, capsys
         railsim.write_report([folder], page)
     with pytest.raises(railsim.InputError, match="files: none; a result file or a folder"):
         railsim.write_report([], tmp_path / "empty.html")
+    with pytest.raises(railsim.InputError, match=r"files: found <Outcome: .*>; the path of"):
+        railsim.write_report(outcome, tmp_path / "empty.html")
     with pytest.raises(railsim.InputError, match="curves: found -1; 1 to 16"):
         railsim.write_report(folder, tmp_path / "empty.html", curves=-1)
     assert main(["report", str(folder), "--curves", "17", "--out", str(tmp_path / "e.html")]) == 2
