@@ -49,7 +49,7 @@ class RailPart:
 
     positions: Floats  # arc lengths of its sections, shape (n,) [m]
     contours: Floats  # y and z of the points, shape (n, 2, k) [m]
-    given: tuple[Floats, ...]  # y and z of the sections as they were given, shape (2, k) [m]
+    sections: tuple[Floats, ...]  # y and z of the sections as they were given, shape (2, k) [m]
 
     @cached_property
     def _slopes(self) -> Floats:
@@ -75,19 +75,19 @@ class RailPart:
         if not self.positions[0] <= s <= self.positions[-1]:
             return np.full(Y.shape, np.inf)
         y, z = self.contour(s)
-        return np.interp(Y, *_upper(y, z), left=np.inf, right=np.inf)
+        return np.interp(Y, *_seen_from_above(y, z), left=np.inf, right=np.inf)
 
     def heights_ahead(self, s: float, Y: Floats) -> Floats:
         """Heights before and behind an arc length, at `AHEAD` of it, float64[ahead, Y] [m]."""
         return np.array([self.height(s + ahead, Y) for ahead in AHEAD])
 
-    def unchanged(self, s: float) -> Floats | None:
+    def constant_section(self, s: float) -> Floats | None:
         """Points of its sections as given where they do not change around `s`, else None."""
         first = int(np.searchsorted(self.positions, s - WINDOW, "right")) - 1
         last = int(np.searchsorted(self.positions, s + WINDOW, "left"))
         if first < 0 or last >= self.positions.size:
             return None
-        around = self.given[max(first - 1, 0) : last + 2]
+        around = self.sections[max(first - 1, 0) : last + 2]
         same = all(np.array_equal(points, around[0]) for points in around)
         return around[0] if same else None
 
@@ -104,7 +104,7 @@ def cubic(
     )
 
 
-def _upper(y: Floats, z: Floats) -> tuple[Floats, Floats]:
+def _seen_from_above(y: Floats, z: Floats) -> tuple[Floats, Floats]:
     """The part of a contour that is seen from above, to both sides of its top."""
     top = int(np.argmin(z))
     right = y >= np.maximum.accumulate(np.where(np.arange(y.size) >= top, y, -np.inf))
@@ -123,24 +123,26 @@ def rail_parts(sections: SectionList) -> tuple[RailPart, ...]:
     chains: list[tuple[list[float], list[Floats]]] = []
     open_chains: list[int] = []
     for s, points in zip(sections.positions.tolist(), sections.points, strict=True):
-        going_on = []
-        for part in _cut(points):
+        continued = []
+        for part in _split_at_grooves(points):
             low, high = _top_range(part)
             best, overlap = -1, 0.0
             for k in open_chains:
                 before = _top_range(chains[k][1][-1])
                 shared = min(high, before[1]) - max(low, before[0])
-                if k not in going_on and shared > overlap:
+                if k not in continued and shared > overlap:
                     best, overlap = k, shared
             if best < 0:
                 chains.append(([], []))
                 best = len(chains) - 1
             chains[best][0].append(s)
             chains[best][1].append(part)
-            going_on.append(best)
-        open_chains = going_on
+            continued.append(best)
+        open_chains = continued
     return tuple(
-        RailPart(np.array(positions), np.array([_shares(part) for part in parts]), tuple(parts))
+        RailPart(
+            np.array(positions), np.array([_contour_points(part) for part in parts]), tuple(parts)
+        )
         for positions, parts in chains
         if len(positions) > 1
     )
@@ -151,7 +153,7 @@ def _top_range(part: Floats) -> tuple[float, float]:
     return float(top.min()), float(top.max())
 
 
-def _cut(points: Floats) -> list[Floats]:
+def _split_at_grooves(points: Floats) -> list[Floats]:
     """Cut a contour where a groove lies between two rails."""
     z = points[1]
     left = np.minimum.accumulate(z)
@@ -160,10 +162,10 @@ def _cut(points: Floats) -> list[Floats]:
     deepest = int(np.argmax(depth))
     if depth[deepest] <= DEEP:
         return [points]
-    return _cut(points[:, : deepest + 1]) + _cut(points[:, deepest:])
+    return _split_at_grooves(points[:, : deepest + 1]) + _split_at_grooves(points[:, deepest:])
 
 
-def _shares(part: Floats) -> Floats:
+def _contour_points(part: Floats) -> Floats:
     """Points of a contour at equal shares before its running edge, and from there to `FAR`."""
     from scipy.interpolate import Akima1DInterpolator
 
@@ -177,11 +179,11 @@ def _shares(part: Floats) -> Floats:
     flank = np.asarray(spline(np.linspace(0.0, edge, FLANK, endpoint=False)))
     y, z = np.asarray(spline(np.arange(edge, length[-1], 0.5 * ACROSS)))
     places = y[0] + (FAR - y[0]) * np.linspace(0.0, 1.0, round(0.11 / ACROSS))
-    behind = np.interp(places, *_upper(y, z), right=ABSENT)
+    behind = np.interp(places, *_seen_from_above(y, z), right=ABSENT)
     return np.concatenate([flank, [places, behind]], axis=1)
 
 
-def _rolled(heights: Floats, radius: float) -> tuple[Floats, Floats]:
+def _envelope(heights: Floats, radius: float) -> tuple[Floats, Floats]:
     """Section on which a wheel of some radius stands on a rail, of the rail's heights at `AHEAD`.
 
     Its heights below the rail tops, and how far ahead of the axle they are [m].
@@ -200,18 +202,18 @@ def _rolled(heights: Floats, radius: float) -> tuple[Floats, Floats]:
     return z, AHEAD[best] + STEP * offset
 
 
-def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) -> curves.RailCurve:
+def envelope_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) -> curves.RailCurve:
     """Return the section of a rail on which a wheel stands as the contact search takes it.
 
     In the frame of the right rail in the track, whose y = 0 lies `zero` beside its middle [m].
     Where the rail does not change it is the section as given.
     """
-    given = part.unchanged(s)
+    given = part.constant_section(s)
     if given is not None:
         return curves.contour_curve(given[0] + zero, given[1])
     y, _ = part.contour(float(np.clip(s, part.positions[0], part.positions[-1])))
     Y = np.arange(y.min() - 2e-3, y.max() + 2e-3, 5.0 * curves.RAIL_SPACING)
-    z, _ = _rolled(part.heights_ahead(s, Y), radius)
+    z, _ = _envelope(part.heights_ahead(s, Y), radius)
     known = np.isfinite(z)
     Y, z = Y[known], z[known]
     usable = curves.single_valued_part(Y, z, int(np.argmin(z)), curves.STEEPEST)
@@ -251,7 +253,7 @@ def rigid_gaps(
     gaps = np.full((s.size, len(wheels), y.size), NOWHERE)
     for i in range(s.size):
         around = heights[every * i : every * i + AHEAD.size]
-        z = np.minimum(_rolled(around, radius)[0], NOWHERE)
+        z = np.minimum(_envelope(around, radius)[0], NOWHERE)
         for k, u, r in present:
             for j, aside in enumerate(y):
                 gaps[i, k, j] = (np.interp(u + aside, Y, z) - r).min() + radius
@@ -270,7 +272,7 @@ def kinematic_height(
     """
     best = (np.inf, 0.0, -1)
     for number, part in enumerate(parts):
-        z, ahead = _rolled(part.heights_ahead(s, wheel[0] + y), radius)
+        z, ahead = _envelope(part.heights_ahead(s, wheel[0] + y), radius)
         gap = z - (wheel[1] - radius)
         k = int(np.argmin(gap))
         if gap[k] < best[0]:

@@ -1,7 +1,7 @@
 """Contact tables of rails whose section changes: one for each rail under the wheel, over s.
 
 At nodes along the track the fields of `railsim.contact.table` are those of the wheel on the section
-on which it stands there, that of `railsim.contact.rail_sections.rolled_curve`, over the lateral
+on which it stands there, that of `railsim.contact.rail_sections.envelope_curve`, over the lateral
 displacement, roll and squared yaw, for each rail on its own: wing and nose are two rails with three
 patches each.  Between the nodes `railsim.kernels.rail_parts` interpolates.
 
@@ -36,18 +36,18 @@ from railsim.contact.rail_sections import (
     WINDOW,
     RailPart,
     cubic,
+    envelope_curve,
     rail_parts,
     rigid_gaps,
-    rolled_curve,
 )
-from railsim.contact.stored_table import generator_hash, kept_table
+from railsim.contact.stored_table import generator_hash, load_or_build
 from railsim.contact.table import (
     ContactTable,
     Generator,
     Normal,
-    chosen_grid,
+    complete_grid,
+    roll_from_stretched,
     spline_coefficients,
-    unstretched_roll,
 )
 from railsim.contact.zones import zone_windows
 from railsim.definitions.section_files import SectionList
@@ -67,7 +67,7 @@ USUAL = np.abs(TRIED) < 7e-3  # those at which nodes are chosen
 
 
 @dataclass(frozen=True, eq=False)
-class Range:
+class SectionRange:
     """Sections of a rail over a range of the track, as one kind of wheel meets them."""
 
     sections: SectionList  # in their own arc length
@@ -80,7 +80,7 @@ class Range:
     normal: Normal
 
 
-def cached_section_table(given: Range) -> ContactTable:
+def cached_section_table(span: SectionRange) -> ContactTable:
     """Contact tables of the rails of a range, built once and kept on disk.
 
     Its `values` are those of zones one after the other, three to a table: shape (n, 3, n_w, n_roll,
@@ -90,31 +90,31 @@ def cached_section_table(given: Range) -> ContactTable:
     digest = hashlib.sha256(generator_hash().encode())
     for module in (rail_sections.__file__, __file__):
         digest.update(Path(module).read_bytes())
-    plain = given.plain
-    facts = (plain.description, plain.centre_height, plain.G, plain.nu, given.normal)
-    digest.update(repr((facts, given.begin, given.end, given.zero)).encode())
-    for part in (given.wheel.key(), given.rail.key(), given.sections.positions.tobytes()):
+    plain = span.plain
+    facts = (plain.description, plain.centre_height, plain.G, plain.nu, span.normal)
+    digest.update(repr((facts, span.begin, span.end, span.zero)).encode())
+    for part in (span.wheel.key(), span.rail.key(), span.sections.positions.tobytes()):
         digest.update(part)
-    for points in given.sections.points:
+    for points in span.sections.points:
         digest.update(points.tobytes())
-    return kept_table(digest.hexdigest(), lambda: section_table(given))
+    return load_or_build(digest.hexdigest(), lambda: section_table(span))
 
 
-def section_table(given: Range) -> ContactTable:
+def section_table(span: SectionRange) -> ContactTable:
     """As `cached_section_table`, built anew."""
-    plain, about = given.plain, given.plain.description
+    plain, about = span.plain, span.plain.description
     gauge, inclination, apart = (
         float(str(about[key])) for key in ("gauge", "inclination", "back_to_back")
     )
     tape, radius = tape_circle_position(apart), plain.r0
-    grid = chosen_grid(None, given.normal)
-    wheel = wheel_curve(given.wheel, radius, tape, min(grid.spacing, grid.ds))
-    level = rail_curve(given.rail, gauge, inclination)
+    grid = complete_grid(None, span.normal)
+    wheel = wheel_curve(span.wheel, radius, tape, min(grid.spacing, grid.ds))
+    level = rail_curve(span.rail, gauge, inclination)
     generator = Generator(wheel, level, radius, plain.centre_height, plain.G, plain.nu, grid)
-    parts = rail_parts(given.sections)
-    nodes, running = chosen_nodes(parts, wheel, level, tape - given.zero, given)
+    parts = rail_parts(span.sections)
+    nodes, running = select_nodes(parts, wheel, level, tape - span.zero, span)
     rise = _height(generator, level) - _height(
-        generator, rolled_curve(parts[running[0]], given.begin, radius, given.zero)
+        generator, envelope_curve(parts[running[0]], span.begin, radius, span.zero)
     )
     # the middle of the plain table: ranges of the lateral position and of the roll
     middle = plain.values.shape[2] // 2
@@ -122,25 +122,8 @@ def section_table(given: Range) -> ContactTable:
     y = np.arange(max(inner, 1), min(outer, plain.values.shape[3] - 3) + 1)
     rolls = np.arange(middle - ROLLS, middle + ROLLS + 1)
     cut = plain.values[:, YAWS, rolls[0] : rolls[-1] + 1, y[0] : y[-1] + 1]
-    wanted: list[tuple[RailPart, float]] = []
-    known: dict[tuple[int, bytes], int] = {}
-    rows: list[list[tuple[float, int, Floats]]] = []
-    for number, part in enumerate(parts):
-        along = []
-        for s, near in nodes[number]:
-            same = part.unchanged(s)
-            key = number, repr(s).encode() if same is None else same.tobytes()
-            if key not in known:
-                known[key] = len(wanted) + 1
-                wanted.append((part, s))
-            along.append((s, known[key], near))
-        whole = np.ones(3, dtype=bool)
-        if along and number == running[0]:
-            along = [(given.begin - FADE, 0, whole), (given.begin, 0, whole), *along]
-        if along and number == running[1]:
-            along = [*along, (given.end, 0, whole), (given.end + FADE, 0, whole)]
-        rows.append(along)
-    kept, described = _kept_zones(rows, given.begin)
+    rows, sections = _rows(parts, nodes, running, span)
+    tables, described = _number_zones(rows, span.begin)
 
     # coefficients at the ends of another rail's table need a node more
     stretched = plain.roll0 + plain.droll * np.arange(rolls[0] - 1, rolls[-1] + 2)
@@ -150,15 +133,15 @@ def section_table(given: Range) -> ContactTable:
         table, zones = task
         if table == 0:
             return cut[zones]
-        rail = rolled_curve(*wanted[table - 1], radius, given.zero)
+        rail = envelope_curve(*sections[table - 1], radius, span.zero)
         rail = replace(rail, z=rail.z + rise)
-        nodes = lateral, unstretched_roll(stretched), plain.w[YAWS]
+        nodes = lateral, roll_from_stretched(stretched), plain.w[YAWS]
         fields = spline_coefficients(generator.values(rail, *nodes, 1), stretched)
         return fields[zones, :, 1:-1, 1:-1]
 
-    first = fill(kept[-1])  # compile once, not in every thread
+    first = fill(tables[-1])  # compile once, not in every thread
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = [*pool.map(fill, kept[:-1]), first]
+        found = [*pool.map(fill, tables[:-1]), first]
     missing = -sum(map(len, found)) % N_PATCH
     values = np.concatenate([*found, np.zeros((missing, *first.shape[1:]))])
     values = values.reshape(-1, N_PATCH, *values.shape[1:])
@@ -173,7 +156,38 @@ def section_table(given: Range) -> ContactTable:
     )
 
 
-def _kept_zones(
+def _rows(
+    parts: tuple[RailPart, ...],
+    nodes: list[list[tuple[float, Floats]]],
+    running: tuple[int, int],
+    span: SectionRange,
+) -> tuple[list[list[tuple[float, int, Floats]]], list[tuple[RailPart, float]]]:
+    """Nodes of each rail as position, number of the table, zones, and the sections of the tables.
+
+    Table 0 is the plain one, n that of section n - 1. Nodes on the same section share a table.
+    """
+    sections: list[tuple[RailPart, float]] = []
+    number_of: dict[tuple[int, bytes], int] = {}
+    rows: list[list[tuple[float, int, Floats]]] = []
+    for number, part in enumerate(parts):
+        along = []
+        for s, near in nodes[number]:
+            same = part.constant_section(s)
+            key = number, repr(s).encode() if same is None else same.tobytes()
+            if key not in number_of:
+                sections.append((part, s))
+                number_of[key] = len(sections)
+            along.append((s, number_of[key], near))
+        whole = np.ones(3, dtype=bool)
+        if along and number == running[0]:
+            along = [(span.begin - FADE, 0, whole), (span.begin, 0, whole), *along]
+        if along and number == running[1]:
+            along = [*along, (span.end, 0, whole), (span.end + FADE, 0, whole)]
+        rows.append(along)
+    return rows, sections
+
+
+def _number_zones(
     rows: list[list[tuple[float, int, Floats]]], begin: float
 ) -> tuple[list[tuple[int, list[int]]], list[list[list[float]]]]:
     """Tables with the zones that are kept of each, and where those of each node lie.
@@ -190,10 +204,10 @@ def _kept_zones(
         masks.append(near)
         for (_, table, _), mask in zip(along, near, strict=True):
             zones.setdefault(table, set()).update(np.flatnonzero(mask).tolist())
-    kept = [(table, sorted(found)) for table, found in sorted(zones.items()) if found]
+    tables = [(table, sorted(found)) for table, found in sorted(zones.items()) if found]
     place, count = {}, 0
-    for table, found in kept:
-        for k in found:
+    for table, present in tables:
+        for k in present:
             place[table, k] = count
             count += 1
     described = [
@@ -203,7 +217,7 @@ def _kept_zones(
         ]
         for along, near in zip(rows, masks, strict=True)
     ]
-    return kept, described
+    return tables, described
 
 
 def _height(generator: Generator, rail: RailCurve) -> float:
@@ -212,8 +226,12 @@ def _height(generator: Generator, rail: RailCurve) -> float:
     return float(generator.values(rail, zero, zero, zero, 1)[:, 0, 0, 0, G].min())
 
 
-def chosen_nodes(
-    parts: tuple[RailPart, ...], wheel: WheelCurve, level: RailCurve, tape: float, given: Range
+def select_nodes(
+    parts: tuple[RailPart, ...],
+    wheel: WheelCurve,
+    level: RailCurve,
+    tape: float,
+    span: SectionRange,
 ) -> tuple[list[list[tuple[float, Floats]]], tuple[int, int]]:
     """Where along the track each rail has a table and of which zones, and which carry at the ends.
 
@@ -221,11 +239,11 @@ def chosen_nodes(
     """
     zone = np.argmax(zone_windows(wheel, level), axis=0)
     wheels = [(wheel.y[zone == k], wheel.r[zone == k]) for k in range(N_PATCH)]
-    s = np.arange(given.begin, given.end, 0.5 * CLOSEST)
-    radius, y = given.plain.r0, tape + TRIED
+    s = np.arange(span.begin, span.end, 0.5 * CLOSEST)
+    radius, y = span.plain.r0, tape + TRIED
     gaps = np.array([rigid_gaps(part, s, radius, wheels, y) for part in parts])
     near = gaps < gaps.min(axis=(0, 2))[None, :, None] + NEAR
-    usual = near & USUAL
+    carrying = near & USUAL
     of_part = gaps[..., USUAL].min(axis=2)
     both = ((of_part < of_part.min(axis=0) + BOTH).sum(axis=0) > 1).any(axis=1)
     tolerance = np.where(both, SHARED, TOLERANCE)[:, None, None]
@@ -236,12 +254,12 @@ def chosen_nodes(
         beyond = WINDOW - CLOSEST
         low, high = part.positions[0] - beyond, part.positions[-1] + beyond
         if number == running[0]:
-            low = given.begin + FADE
+            low = span.begin + FADE
         if number == running[1]:
-            high = given.end - FADE
+            high = span.end - FADE
         first, last = np.searchsorted(s, (low, high))
         last = min(int(last), s.size - 1)
-        limit = np.where(usual[number], tolerance, np.inf)
+        limit = np.where(carrying[number], tolerance, np.inf)
         found = _split(s, gaps[number], limit, int(first), last) if first < last else []
         nodes.append([(float(s[i]), near[number, i].any(axis=1)) for i in found])
     return nodes, running

@@ -11,7 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from railsim.contact.table import ContactTable, Normal, TableGrid, build_contact_table, chosen_grid
+from railsim.contact.table import (
+    ContactTable,
+    Normal,
+    TableGrid,
+    build_contact_table,
+    complete_grid,
+)
 from railsim.kernels import cache, contact_geometry, elastic_patch, non_elliptic
 from railsim.kernels import hertz as hertz_kernel
 from railsim.kernels import table_slice as kernel
@@ -60,13 +66,13 @@ def cached_contact_table(
     share one copy.  A table that is not, byte for byte, what was stored is built again: all of it
     is read once after each change of its file's number, size or time.
     """
-    grid = chosen_grid(grid, normal)
+    grid = complete_grid(grid, normal)
     numbers = (radius, gauge, inclination, back_to_back, tape_circle_distance, G, nu)
     height = centre_height
     digest = hashlib.sha256(generator_hash().encode())
     for part in (repr((numbers, height, grid, widening)).encode(), wheel.key(), rail.key()):
         digest.update(part)
-    return kept_table(
+    return load_or_build(
         digest.hexdigest(),
         lambda: build_contact_table(
             wheel, rail, *numbers, centre_height=height, grid=grid, widening=widening
@@ -74,7 +80,7 @@ def cached_contact_table(
     )
 
 
-def kept_table(digest: str, build: Callable[[], ContactTable]) -> ContactTable:
+def load_or_build(digest: str, build: Callable[[], ContactTable]) -> ContactTable:
     """Return the table stored under a hash of all that enters, or build and store it."""
     folder = cache.cache_subfolder("tables")
     if folder is None:

@@ -250,7 +250,7 @@ def build_contact_table(
     InputError
         If the wheelset does not fit into the track, or a profile cannot be used.
     """
-    grid = chosen_grid(grid, normal)
+    grid = complete_grid(grid, normal)
     height = radius if centre_height is None else centre_height
     wheel_points = curves.wheel_curve(
         wheel, radius, curves.tape_circle_position(back_to_back), min(grid.spacing, grid.ds)
@@ -258,14 +258,14 @@ def build_contact_table(
     rail_nodes = curves.rail_curve(rail, gauge, inclination)
     pair = f"{wheel.name} on {rail.name}"
     Faults(curves.misfits(wheel_points, rail_nodes, gauge, pair)).check()
-    usual = table_range(wheel_points, rail_nodes, widening)
-    s_min = usual[0] if grid.s_min is None else grid.s_min
-    s_max = usual[1] if grid.s_max is None else grid.s_max
+    default_range = table_range(wheel_points, rail_nodes, widening)
+    s_min = default_range[0] if grid.s_min is None else grid.s_min
+    s_max = default_range[1] if grid.s_max is None else grid.s_max
     n_y = round((s_max - s_min) / grid.ds) + 1
     # a cubic spline needs two nodes to each side of the middle
     half = max(int(np.ceil(stretched_roll(grid.roll_max)[0] / grid.droll)), 2)
     stretched_nodes = grid.droll * np.arange(-half, half + 1, dtype=np.float64)
-    roll_nodes = unstretched_roll(stretched_nodes)
+    roll_nodes = roll_from_stretched(stretched_nodes)
     s_nodes = s_min + grid.ds * np.arange(n_y, dtype=np.float64)
     w_nodes = yaw_nodes(grid)
     generator = Generator(wheel_points, rail_nodes, radius, height, G, nu, grid)
@@ -299,7 +299,7 @@ def build_contact_table(
     )
 
 
-def chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
+def complete_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
     """Return the grid of a table, with another normal contact if requested."""
     grid = grid or TableGrid()
     return replace(grid, normal=normal) if normal else grid
@@ -385,7 +385,7 @@ def yaw_nodes(grid: TableGrid) -> Floats:
     return nodes
 
 
-def unstretched_roll(stretched: Floats) -> Floats:
+def roll_from_stretched(stretched: Floats) -> Floats:
     """Roll of which `railsim.kernels.contact_table.stretched_roll` makes the given values [rad]."""
     # q = x^2/sqrt(1 + x^2) with x = roll/FINE_ROLL: x^4 - q^2 x^2 - q^2 = 0
     q = (stretched / FINE_ROLL) ** 2
@@ -418,8 +418,8 @@ def _to_coefficients(result: Floats, values: Floats, near: Floats) -> None:
         source[1:-1] -= share * second / 6.0
     np.maximum(result[..., A1], 0.5 * values[..., A1], out=result[..., A1])
     np.maximum(result[..., B1], 0.5 * values[..., B1], out=result[..., B1])
-    wide = 0.5 * (values[..., B1] + values[..., D_B1])
-    np.maximum(result[..., D_B1], wide - result[..., B1], out=result[..., D_B1])
+    endless = 0.5 * (values[..., B1] + values[..., D_B1])
+    np.maximum(result[..., D_B1], endless - result[..., B1], out=result[..., D_B1])
     # K and K + K2 sqrt(e) at e = 0.1 mm
     low = np.zeros(values.shape[:-1], dtype=bool)
     for root in (0.0, 0.01):

@@ -39,13 +39,13 @@ def table_range(wheel: WheelCurve, rail: RailCurve, widening: float = 0.0) -> tu
     tip = float(wheel.u[int(np.argmax(wheel.r))])
     top = float(rail.Y[int(np.argmax(rail.slope > -CROWN_SLOPE))])
     climbed = np.ceil(1e3 * (top - tip)) / 1e3
-    return -float(climbed + covered_widening(widening)) - MORE_INWARDS, float(climbed)
+    return -float(climbed + table_widening(widening)) - MORE_INWARDS, float(climbed)
 
 
-def covered_widening(widening: float) -> float:
+def table_widening(widening: float) -> float:
     """Widening of the gauge that a table for the given one covers [m].
 
-    >>> [covered_widening(widening) for widening in (0.0, 0.003, 0.005, 0.0051, 0.1)]
+    >>> [table_widening(widening) for widening in (0.0, 0.003, 0.005, 0.0051, 0.1)]
     [0.0, 0.005, 0.005, 0.01, 0.04]
     """
     asked = min(max(widening, 0.0), MOST_WIDENING)
@@ -61,7 +61,7 @@ def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Floats:
 
     Ends of a long jump of the contact are patches of their own.  On a hollow wheel it jumps from
     the rim on the field side to the side of the flange; where these borders would leave both ends
-    with parts of the tread, the border of tread and root lies in between (`hollow_between`).
+    with parts of the tread, the border of tread and root lies in between (`border_of_branches`).
 
     Returns shape (3, n), windows adding up to 1 [1].
     """
@@ -88,11 +88,11 @@ def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Floats:
         return np.stack((1.0 - root, root - flange, flange))
 
     by_angle = windows(passes(10.0), passes(15.0))
-    hollow = hollow_between(wheel, rail, by_angle)
+    hollow = border_of_branches(wheel, rail, by_angle)
     return windows(*hollow) if hollow else by_angle
 
 
-def hollow_between(
+def border_of_branches(
     wheel: WheelCurve, rail: RailCurve, window: Floats
 ) -> tuple[float, float] | None:
     """Where on the wheel two branches of the contact that share a zone lie apart.

@@ -151,7 +151,7 @@ def patch_sums(z, theta, h, lift, du, window, to_start, weight):
 
 
 @compiled(in_loop=False)
-def weighted(weight, values):
+def weighted_sum(weight, values):
     """Sum of weight times value."""
     total = 0.0
     for i in range(weight.size):
@@ -160,7 +160,7 @@ def weighted(weight, values):
 
 
 @compiled(in_loop=False)
-def interpolated(x, x0, dx, values):
+def interpolate(x, x0, dx, values):
     """Linear interpolation on a uniform grid, constant beyond its ends."""
     s = (x - x0) / dx
     if not s > 0.0:
@@ -180,16 +180,16 @@ def unit_ellipse(A, B, hertz):
     """
     log_ratio = math.log(A / B)
     scale = A ** (1.0 / 3.0)
-    a1 = math.exp(interpolated(log_ratio, hertz.start, hertz.spacing, hertz.logarithms[0])) / scale
-    b1 = a1 * math.exp(interpolated(log_ratio, hertz.start, hertz.spacing, hertz.logarithms[1]))
-    d1 = math.exp(interpolated(log_ratio, hertz.start, hertz.spacing, hertz.logarithms[2])) * scale
+    a1 = math.exp(interpolate(log_ratio, hertz.start, hertz.spacing, hertz.logarithms[0])) / scale
+    b1 = a1 * math.exp(interpolate(log_ratio, hertz.start, hertz.spacing, hertz.logarithms[1]))
+    d1 = math.exp(interpolate(log_ratio, hertz.start, hertz.spacing, hertz.logarithms[2])) * scale
     return a1, b1, d1
 
 
 @compiled(in_loop=False)
-def kept_above(B, least):
+def smooth_maximum(B, floor):
     """Smooth maximum of B and a floor: B + floor^2/B far above, the floor at B = 0 [1/m]."""
-    return 0.5 * (B + math.sqrt(B * B + 4.0 * least * least))
+    return 0.5 * (B + math.sqrt(B * B + 4.0 * floor * floor))
 
 
 @compiled(in_loop=False)
@@ -225,7 +225,7 @@ def averaged_curvature(A, curvature, half_widths, hertz, load, floor_ratio):
             j += 1
         x = (b - half_widths[j]) / (half_widths[j + 1] - half_widths[j])
         x = min(max(x, 0.0), 1.0)
-        B = kept_above(
+        B = smooth_maximum(
             0.5 * (curvature[j] + x * (curvature[j + 1] - curvature[j])), floor_ratio * A
         )
         # the geometric mean damps the iteration, which may swing in the flange root
@@ -234,7 +234,7 @@ def averaged_curvature(A, curvature, half_widths, hertz, load, floor_ratio):
 
 
 @compiled(in_loop=False)
-def energies_of(share, z, U, energy):
+def fill_energies(share, z, U, energy):
     """Potential with a given share of its second term that has the first and the last energy.
 
     U = k e^(5/2) (2/5 (1 - share) + share/3 sqrt(e/REFERENCE)),   e = z - g
@@ -250,18 +250,18 @@ def energies_of(share, z, U, energy):
     """
     a, b = 0.4 * (1.0 - share), share / (3.0 * math.sqrt(REFERENCE))
     # U_2/U_0 falls with the depth e_0; for a single power m it is known
-    wanted = U[2] / U[0]
+    ratio = U[2] / U[0]
     span = z[2] - z[0]
-    e = span / (wanted**0.37 - 1.0)
+    e = span / (ratio**0.37 - 1.0)
     for _ in range(MOST_ITERATIONS):
         s0, s2 = math.sqrt(e), math.sqrt(e + span)
         u0, u2 = s0**5 * (a + b * s0), s2**5 * (a + b * s2)
         slope = s2**3 * (2.5 * a + 3.0 * b * s2) / u2 - s0**3 * (2.5 * a + 3.0 * b * s0) / u0
-        step = math.log(u2 / u0 / wanted) / slope
-        after = e - step
-        after = min(max(after, 0.3 * e), 3.0 * e)
-        change = abs(after - e)
-        e = after
+        step = math.log(u2 / u0 / ratio) / slope
+        following = e - step
+        following = min(max(following, 0.3 * e), 3.0 * e)
+        change = abs(following - e)
+        e = following
         if change < 1e-14:
             break
     k = U[0] / (e**2.5 * (a + b * math.sqrt(e)))
@@ -288,10 +288,10 @@ def fit_energy(z, U):
     """
     energy = np.empty(3)
     a, b = LEAST_SHARE, 1.0
-    energies_of(b, z, U, energy)
+    fill_energies(b, z, U, energy)
     f_b = energy[2] / U[1] - 1.0
     if f_b < 0.0:
-        energies_of(a, z, U, energy)
+        fill_energies(a, z, U, energy)
         f_a = energy[2] / U[1] - 1.0
         b = a
         if f_a > 0.0:
@@ -299,7 +299,7 @@ def fit_energy(z, U):
             a, b = 1.0, LEAST_SHARE
             for _ in range(MOST_ITERATIONS):
                 x = b - f_b * (b - a) / (f_b - f_a)
-                energies_of(x, z, U, energy)
+                fill_energies(x, z, U, energy)
                 f = energy[2] / U[1] - 1.0
                 if f * f_b < 0.0:
                     a, f_a = b, f_b
@@ -308,5 +308,5 @@ def fit_energy(z, U):
                 b, f_b = x, f
                 if abs(f) < 1e-12 or abs(b - a) < 1e-12:
                     break
-    energies_of(b, z, U, energy)
+    fill_energies(b, z, U, energy)
     return energy[0], (1.0 - b) * energy[1], b / math.sqrt(REFERENCE) * energy[1]

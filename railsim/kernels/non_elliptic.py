@@ -3,7 +3,7 @@
 import math
 
 from railsim.kernels import compiled
-from railsim.kernels.elastic_patch import interpolated
+from railsim.kernels.elastic_patch import interpolate
 
 VIRTUAL_SHARE = 0.55  # of the approach, Kik and Piotrowski (1996)
 
@@ -50,19 +50,19 @@ def kik_piotrowski(zone, first, last, centre, delta, E_star, strips):
     """
     h, lift, y, length = zone.h, zone.lift, zone.c_y, zone.length
     z = 1e9
-    best = first
+    lowest = first
     for k in range(first, last):
         height = h[k] + lift[k] * delta
         if height < z:
             z = height
-            best = k
+            lowest = k
     # candidate nearest to the patch's centre, from which the patch is followed to both sides
-    middle = best
+    middle = lowest
     for k in range(first, last):
         if abs(y[k] - centre) < abs(y[middle] - centre):
             middle = k
     if _virtual_overlap(zone, z, delta, middle) <= 0.0:
-        middle = best
+        middle = lowest
     start = _patch_end(zone, z, delta, middle, -1)
     end = _patch_end(zone, z, delta, middle, 1)
     area = load_sum = depth_sum = width = longest = 0.0
@@ -76,7 +76,7 @@ def kik_piotrowski(zone, first, last, centre, delta, E_star, strips):
         # the centre's own element: the mean of the logarithm over it
         distance = max(abs(s), length[k] / (2.0 * math.e))
         influence = math.exp(
-            interpolated(math.log(distance / half), strips.start, strips.spacing, strips.strip)
+            interpolate(math.log(distance / half), strips.start, strips.spacing, strips.strip)
         )
         load_sum += 0.5 * math.pi * squared * length[k]
         depth_sum += half * influence * length[k]
@@ -102,7 +102,7 @@ def _patch_end(zone, z, delta, middle, step):
     """
     k = middle
     overlap = _virtual_overlap(zone, z, delta, k)
-    while 0 <= k + step < zone.h.size:
+    while zone.low <= k + step < zone.high:
         following = _virtual_overlap(zone, z, delta, k + step)
         if following <= 0.0 or (zone.window[k + step] < 0.5 and following > overlap):
             break
@@ -118,7 +118,7 @@ def _virtual_overlap(zone, z, delta, k):
 
 
 @compiled(in_loop=False)
-def corrected_by_hertz(patch, A, B, ellipse, delta, E_star, strips):
+def scale_to_hertz(patch, A, B, ellipse, delta, E_star, strips):
     """Force and axes of `kik_piotrowski`, made exact for elliptic patches.
 
     Each is multiplied by the ratio of Hertz' to the method's own value for the ellipse of the
@@ -131,7 +131,7 @@ def corrected_by_hertz(patch, A, B, ellipse, delta, E_star, strips):
     virtual = VIRTUAL_SHARE * delta
     a_virtual, b_virtual = math.sqrt(virtual / A), math.sqrt(virtual / B)
     influence = math.exp(
-        interpolated(math.log(b_virtual / a_virtual), strips.start, strips.spacing, strips.whole)
+        interpolate(math.log(b_virtual / a_virtual), strips.start, strips.spacing, strips.whole)
     )
     N_virtual = math.pi * E_star * delta * (2.0 * math.pi / 3.0) * a_virtual / influence
     N_hertz = (delta / ellipse[2]) ** 1.5
@@ -156,7 +156,7 @@ def non_elliptic_axes(zone, first, last, centre, A, B, ellipse, load, E_star, st
     delta = ellipse[2] * load ** (2.0 / 3.0)
     for _ in range(3):
         patch = kik_piotrowski(zone, first, last, centre, delta, E_star, strips)
-        N, a, b = corrected_by_hertz(patch, A, B, ellipse, delta, E_star, strips)
+        N, a, b = scale_to_hertz(patch, A, B, ellipse, delta, E_star, strips)
         if N <= 0.0:
             return 0.0, 0.0
         last_load = N

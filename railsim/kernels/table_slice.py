@@ -15,10 +15,10 @@ from railsim.kernels.elastic_patch import (
     averaged_curvature,
     fit_energy,
     height_under_load,
-    kept_above,
     patch_sums,
+    smooth_maximum,
     unit_ellipse,
-    weighted,
+    weighted_sum,
 )
 from railsim.kernels.non_elliptic import non_elliptic_axes
 
@@ -91,7 +91,7 @@ class Elastic(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """Candidates of a wheel in position on the rail, those of one zone filled as far as needed.
+    """Candidates of a wheel in position on the rail, filled from `low` to `high`, `high` exclusive.
 
     h : gap at z = 0 [m]; lift : 1/cos(contact angle), mean of wheel and rail [1]; du, length :
     distance to the next candidate along the axle, and of the neighbours along the contour [m];
@@ -112,6 +112,8 @@ class Zone(NamedTuple):
     wheel_curvature: np.ndarray
     rail_curvature: np.ndarray
     node: np.ndarray
+    low: int
+    high: int
 
 
 @compiled(in_loop=False)
@@ -165,10 +167,17 @@ def fill_table_slice(
         for p in range(n_patch):
             if least[p] > nearest + OUT_OF_REACH or least[p] == FAR_AWAY:
                 continue
+            first, last = wheel.first[p], wheel.last[p]
             start, end = near_candidates(
-                y, p, least[p], c_y, c_z, stretch, centre_height, wheel, rail
+                y, first, last, least[p], c_y, c_z, stretch, centre_height, wheel, rail
             )
-            for k in range(start, end):
+            low, high = start, end
+            if elastic.non_elliptic:  # whose patches go on in the neighbouring zones
+                first %= STRIDE  # so that the lowest one is among those that are tried
+                low, high = near_candidates(
+                    y, first, n, least[p], c_y, c_z, stretch, centre_height, wheel, rail
+                )
+            for k in range(low, high):
                 height, along, node[k] = rail_height(
                     y + c_y[k], rail.Y0, rail.dY, rail.z, rail.slope
                 )
@@ -188,14 +197,15 @@ def fill_table_slice(
                 wheel.curvature,
                 rail.curvature,
                 node,
+                low,
+                high,
             )
             fill_zone(values[p, i], zone, start, end, elastic, hertz, strips)
 
 
 @compiled(in_loop=False)
-def near_candidates(y, p, least, c_y, c_z, stretch, centre_height, wheel, rail):
-    """Range of a zone's candidates around those that can touch, `end` exclusive."""
-    first, last = wheel.first[p], wheel.last[p]
+def near_candidates(y, first, last, least, c_y, c_z, stretch, centre_height, wheel, rail):
+    """Range of candidates from `first` to `last` around those that can touch, ends exclusive."""
     start, end = last, first
     for k in range(first, last, STRIDE):
         height, slope, _ = rail_height(y + c_y[k], rail.Y0, rail.dY, rail.z, rail.slope)
@@ -222,13 +232,13 @@ def fill_zone(out, zone, start, end, elastic, hertz, strips):
     along, across, _, carried, _ = patch_sums(
         z, FIRST_THETA, h, lift, du, zone.window[start:end], scratch, weight
     )
-    A = 0.5 * along * carried / (across * weighted(weight, zone.radius[start:end]))
-    curvature = averaged_over_widths(zone, start, weight) / carried
+    A = 0.5 * along * carried / (across * weighted_sum(weight, zone.radius[start:end]))
+    curvature = curvature_sums(zone, start, weight) / carried
     B = averaged_curvature(
         A, curvature, elastic.half_widths, hertz, elastic.reference, elastic.floor_ratio
     )
     _, b1, d1 = unit_ellipse(A, B, hertz)
-    start, end = within(z + MORE_LOAD * across / along, h, start, end)
+    start, end = loaded_candidates(z + MORE_LOAD * across / along, h, start, end)
     h, lift, du = zone.h[start:end], zone.lift[start:end], zone.du[start:end]
     scratch, weight = np.empty(end - start), np.empty(end - start)
     depth = (z - least) / elastic.reference ** (2.0 / 3.0)
@@ -245,13 +255,13 @@ def fill_zone(out, zone, start, end, elastic, hertz, strips):
         )
         heights[j] = z
         energies[j] = k * energy + carried / along * 0.4 * kappa * load ** (5.0 / 3.0)
-        A = 0.5 * along * carried / (across * weighted(weight, zone.radius[start:end]))
-        B = kept_above((4.0 / 3.0 * k / load) ** 2 * deepest**3, elastic.floor_ratio * A)
+        A = 0.5 * along * carried / (across * weighted_sum(weight, zone.radius[start:end]))
+        B = smooth_maximum((4.0 / 3.0 * k / load) ** 2 * deepest**3, elastic.floor_ratio * A)
         ellipse = unit_ellipse(A, B, hertz)
         axis[j], fields[2, j] = ellipse[0], ellipse[1]
-        fields[0, j] = weighted(weight, zone.c_y[start:end]) / carried
-        fields[1, j] = weighted(weight, zone.c_z[start:end]) / carried
-        fields[3, j] = weighted(weight, zone.slope[start:end]) / carried
+        fields[0, j] = weighted_sum(weight, zone.c_y[start:end]) / carried
+        fields[1, j] = weighted_sum(weight, zone.c_z[start:end]) / carried
+        fields[3, j] = weighted_sum(weight, zone.slope[start:end]) / carried
         if elastic.non_elliptic:
             a, b = non_elliptic_axes(
                 zone, start, end, fields[0, j], A, B, ellipse, load, elastic.E_star, strips
@@ -260,11 +270,11 @@ def fill_zone(out, zone, start, end, elastic, hertz, strips):
                 axis[j], fields[2, j] = a, b
     out[G], out[K], out[K2] = fit_energy(heights, energies)
     out[A1] = axis[1]
-    over_load(out, fields)
+    fit_load_dependence(out, fields)
 
 
 @compiled(in_loop=False)
-def within(limit, h, start, end):
+def loaded_candidates(limit, h, start, end):
     """Range of the candidates from the first to the last whose gap is below a limit, and one more.
 
     `h`, shape (end - start,), holds the gaps from `start` on [m].
@@ -278,7 +288,7 @@ def within(limit, h, start, end):
 
 
 @compiled(in_loop=False)
-def averaged_over_widths(zone, start, weight):
+def curvature_sums(zone, start, weight):
     """Weighted sums of the relative curvature, for each width over which it is averaged."""
     sums = np.zeros(zone.wheel_curvature.shape[0])
     for i in range(weight.size):
@@ -292,14 +302,14 @@ def averaged_over_widths(zone, start, weight):
 
 
 @compiled(in_loop=False)
-def over_load(out, fields):
+def fit_load_dependence(out, fields):
     """Fields of the form v + dv N/(N + HALF_LOAD), as near as possible to the three loads'."""
     loads = np.array(LOADS)
     tau = loads / (loads + HALF_LOAD)
-    away = tau - tau.mean()
+    deviation = tau - tau.mean()
     for m in range(N_OF_LOAD):
         mean = fields[m].mean()
-        difference = np.sum(away * fields[m]) / np.sum(away * away)
+        difference = np.sum(deviation * fields[m]) / np.sum(deviation * deviation)
         start = mean - difference * tau.mean()
         if m == 2:
             start = max(start, LEAST_AXIS * mean)

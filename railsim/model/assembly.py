@@ -17,7 +17,7 @@ from railsim.contact.coupling import coupling
 from railsim.contact.kalker import creep_tables
 from railsim.contact.stored_table import cached_contact_table
 from railsim.contact.table import ContactTable
-from railsim.contact.zones import covered_widening
+from railsim.contact.zones import table_widening
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.base import once
 from railsim.definitions.loading import check_types
@@ -342,7 +342,7 @@ def _contact(
                 "centre_height": -body.position[2],
                 "back_to_back": wheelset.back_to_back,
                 "tape_circle_distance": wheelset.tape_circle_distance,
-                "widening": covered_widening(track.widest),  # auxiliary runs stand on plain track
+                "widening": table_widening(track.widest),  # auxiliary runs stand on plain track
             }
             of_wheel, of_rail = wheelset.profile[side], track.rail[side]
             key = (of_wheel, of_rail, *own.values())

@@ -10,7 +10,7 @@ import numpy as np
 
 from railsim.arrays import Floats, Integers
 from railsim.contact.curves import gauge_face
-from railsim.contact.section_tables import Range, cached_section_table
+from railsim.contact.section_tables import SectionRange, cached_section_table
 from railsim.contact.table import ContactTable, Normal
 from railsim.definitions import Track
 from railsim.definitions.section_files import SectionList
@@ -117,12 +117,12 @@ def _range(
     pair: tuple[Profile, Profile],
     plain: ContactTable,
     normal: Normal,
-) -> Range:
+) -> SectionRange:
     assert part.contours is not None
     contours = tuple(np.array([contour.y, contour.z]) for contour in part.contours)
     sections = SectionList(np.array([contour.s for contour in part.contours]), contours)
     face = _gauge_face(contours) if part.gauge_face is None else part.gauge_face
-    return Range(
+    return SectionRange(
         sections=sections,
         begin=round(part.begin - part.shift, 9),
         end=round(part.end - part.shift, 9),

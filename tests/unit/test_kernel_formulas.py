@@ -659,4 +659,4 @@ def test_sums_over_a_patch_are_integrals_of_its_overlap():
     np.testing.assert_allclose(weight, means, rtol=1e-5)
     assert deepest == pytest.approx(max((z - h) / lift) - theta)
     assert weight[0] > 0.0
-    assert elastic_patch.weighted.py_func(weight, 2.0 + h) == pytest.approx(weight @ (2.0 + h))
+    assert elastic_patch.weighted_sum.py_func(weight, 2.0 + h) == pytest.approx(weight @ (2.0 + h))

@@ -6,9 +6,11 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import elliprd, elliprf
 
-from railsim.contact.table import strip_influence
+from railsim.contact.curves import rail_curve, tape_circle_position, wheel_curve
+from railsim.contact.table import Generator, TableGrid, strip_influence
 from railsim.kernels.non_elliptic import kik_piotrowski, non_elliptic_axes
 from railsim.kernels.table_slice import Zone
+from railsim.profiles import load_profile
 
 E_STAR, DELTA, VIRTUAL = 1.1e11, 80e-6, 0.55
 
@@ -20,7 +22,8 @@ def zone(y, h, radius):
     more = {"h": h, "du": width, "length": width, "c_y": y, "c_z": 0.0 * y, "slope": 0.0 * y}
     both = {name: np.zeros((1, len(y))) for name in ("wheel_curvature", "rail_curvature")}
     node = np.zeros(len(y), dtype=np.int64)
-    return Zone(**{**fields, **more, **both, "radius": radius, "node": node})
+    filled = {"node": node, "low": 0, "high": len(y)}
+    return Zone(**{**fields, **more, **both, "radius": radius, **filled})
 
 
 def patch(of, centre=0.0):
@@ -87,3 +90,14 @@ def test_mirrored_contour_has_the_same_patch():
     other = zone(-y[::-1], h[::-1], one.radius[::-1].copy())
     assert patch(one)[0] > 1e3
     np.testing.assert_allclose(patch(other), patch(one), rtol=1e-9)
+
+
+def test_patches_on_the_border_of_two_zones_do_not_depend_on_what_was_computed_before():
+    """A patch goes on in the neighbouring zone: its candidates there are those of its own node."""
+    wheel = wheel_curve(load_profile("S1002"), 0.46, tape_circle_position(1.360), 1e-4)
+    rail = rail_curve(load_profile("60E1"), 1.435, 0.025)
+    grid = TableGrid(normal="kik-piotrowski")
+    generator = Generator(wheel, rail, 0.46, 0.46, 82e9, 0.28, grid)
+    s, zero = np.arange(-10e-3, 10e-3, 3e-4), np.zeros(1)
+    forward, back = (generator.values(rail, y, zero, zero, 1) for y in (s, s[::-1]))
+    np.testing.assert_array_equal(back[:, :, :, ::-1], forward)

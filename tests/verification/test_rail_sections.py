@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 from selection import points
 
 from railsim.contact.curves import HALF_WIDTHS, wheel_curve
-from railsim.contact.rail_sections import kinematic_height, rail_parts, rolled_curve
-from railsim.contact.section_tables import Range, _kept_zones, section_table
+from railsim.contact.rail_sections import envelope_curve, kinematic_height, rail_parts
+from railsim.contact.section_tables import SectionRange, _number_zones, section_table
 from railsim.contact.table import _wheel_arrays, ellipse_functions, strip_influence
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.section_files import SectionList, read_sections
@@ -97,7 +97,7 @@ def carried(parts, wheel, y, s=0.239, load=10e3):
     """Height of the wheel [mm] and loads of the rails, such as wing and nose [N], under a load."""
     tables = []
     for part in parts:
-        rail = rolled_curve(part, s, RADIUS)
+        rail = envelope_curve(part, s, RADIUS)
         fields = np.empty((3, 1, 12))
         kernel.fill_table_slice(
             fields,
@@ -163,7 +163,7 @@ def test_every_table_along_a_rising_rail_lies_higher_by_its_way():
     settings = load_settings()
     model = assemble(load_vehicle("coach_manchester"), load_track("straight"), settings)
     plain, profiles = model.tables[0], (load_profile("S1002"), load_profile("60E1"))
-    given = Range(sections, 0.0, 0.22, 0.75, *profiles, plain, settings.normal_contact)
+    given = SectionRange(sections, 0.0, 0.22, 0.75, *profiles, plain, settings.normal_contact)
     table = section_table(given)
     (rows,) = table.description["parts"]
     along, zones = np.array(rows)[:, 0], np.array(rows)[:, 1:].astype(int)
@@ -202,7 +202,7 @@ def test_sections_of_a_rail_stand_under_the_wheels_of_its_side(monkeypatch):
 def test_a_rail_that_stands_beside_the_range_alone_has_no_tables():
     """Such as the nose of a crossing whose range ends ahead of it."""
     all_zones = np.ones(3, dtype=bool)
-    kept, described = _kept_zones([[(0.0, 0, all_zones), (0.1, 1, all_zones)], []], 0.0)
+    kept, described = _number_zones([[(0.0, 0, all_zones), (0.1, 1, all_zones)], []], 0.0)
     assert kept == [(0, [0, 1, 2]), (1, [0, 1, 2])]
     assert described == [[[0.0, 0, 1, 2], [0.1, 3, 4, 5]], []]
 
@@ -214,10 +214,10 @@ def test_a_wheel_beyond_the_end_of_a_rail_stands_on_its_edge(beyond, end):
     y = np.linspace(-0.035, 0.035, 40)
     s = np.linspace(-0.5, 0.5, 11)
     (part,) = rail_parts(SectionList(s, tuple(np.array([y, 1.3e4 * y**4]) for _ in s)))
-    there = rolled_curve(part, end * (0.5 + beyond), RADIUS)
+    there = envelope_curve(part, end * (0.5 + beyond), RADIUS)
     lower = RADIUS - np.sqrt(RADIUS**2 - beyond**2)
     assert there.z.min() == pytest.approx(lower, abs=2e-6)
-    assert rolled_curve(part, 0.0, RADIUS).z.min() == pytest.approx(0.0, abs=2e-6)
+    assert envelope_curve(part, 0.0, RADIUS).z.min() == pytest.approx(0.0, abs=2e-6)
 
 
 @pytest.mark.further
