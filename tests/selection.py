@@ -438,7 +438,7 @@ LONG = frozenset(
         "interface/test_optimise.py::"
         "test_run_with_an_assessment_is_kept_when_only_the_analysis_changes",
         "verification/test_controllers.py::"
-        "test_skyhook_decays_as_its_linearised_loop[0.0-sampled0]",
+        "test_skyhook_decays_as_its_linearised_loop[skyhook-0.0-sampled0]",
         "interface/test_section_values.py::"
         "test_every_value_of_a_section_is_that_of_its_filtered_tones[-1-4-23.0-265.0-70.0]",
         "interface/test_verdicts.py::test_curves_to_one_hand_only_do_not_meet_the_conditions",

@@ -1,13 +1,15 @@
 """A vehicle with its controllers, linearised about steady rolling.
 
 With the vehicle's x' = A x + B u, what the controllers give for the state is measured on the run's
-own code: w = K x + D u, by differences of one call of the loop at the states about steady rolling.
-It acts as u(t) = w(t - T), T being the actuator's delay, that of the slowest signal, a step of the
-loop, and half the time for which a command is held, the longest of the controller's period and the
-time between two samples of its signals (Franklin, Powell, Workman 1998,
-Digital control of dynamic systems, 4.4); the delay is that of Pade of order 1,
-(1 - T s/2)/(1 + T s/2).  Noise, resolution and limits are left out, laws start with their memory
-at 0.
+own code, by differences of one call of the loop at the states about steady rolling: commands
+w = K x + D u + H m, and what they remember, m(t + T_c) = F m + G (x, u), from m = 0 on.  In
+continuous time a memory follows by the bilinear transformation z = (1 + s T_c/2)/(1 - s T_c/2) with
+the controller's period T_c (Franklin, Powell, Workman 1998, Digital control of dynamic systems,
+6.3).  A command acts as u(t) = w(t - T), T being the actuator's delay, that of the slowest signal,
+a step of the loop, and half the time for which a command is held, the longest of the controller's
+period and the time between two samples of its signals (ibid., 4.4); the delay is that of Pade of
+order 1, (1 - T s/2)/(1 + T s/2).  Noise, resolution and limits are left out, and so is what a
+memory does that is not linear near 0, such as a counter.
 """
 
 from typing import Any
@@ -30,6 +32,7 @@ from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
 
 COMMAND_STEP = 1.0  # unit of the command
+MEMORY_STEP = 1e-6  # of a memory, whatever it holds
 
 
 def closed_loop(
@@ -45,8 +48,8 @@ def closed_loop(
 
     `speed`: [m/s]; `step`: step of the loop, after which a command acts [s]; `settings`, `how`: as
     for `railsim.linear.vehicle.LinearVehicle`. Returns: the last coordinates are those of the
-    delays, named after the actuators. Raises ModelError: the vehicle or a controller has no finite
-    value there.
+    delays, named after the actuators, and of the memories, after the controllers. Raises
+    ModelError: the vehicle or a controller has no finite value there.
     """
     prepared = LinearVehicle(vehicle, track, settings=settings, **how)
     free = prepared.free(speed)
@@ -56,20 +59,30 @@ def closed_loop(
     free.system = free.system._replace(actuators=free.system.actuators._replace(codes=which))
     n = len(free.coordinates.names)
     A, B = free.tangent(), _rates_by_command(free)
-    K, D, delay = _loop(prepared, free, vehicle, settings or Settings(), delays + step)
-    m = B.shape[1]
-    matrix = np.zeros((n + m, n + m))
+    loop, names, periods, delay = _loop(prepared, free, vehicle, settings or Settings(), delays)
+    m, k = B.shape[1], len(periods)
+    z, total = slice(n, n + m), n + m + k
+    commands, memory, G = loop[:m, n + m :], loop[m:, n + m :], loop[m:, : n + m]
+    try:
+        W = np.linalg.inv(memory + np.eye(k))
+    except np.linalg.LinAlgError:
+        raise ModelError("the memory of a controller changes its sign from call to call") from None
+    direct = loop[:m, : n + m] - commands @ W @ G  # K and D
     # u = z - w with z' = -2/T z + 4/T w
-    inverse = np.linalg.inv(np.eye(m) + D)
-    u_x, u_z = -inverse @ K, inverse
-    matrix[:n, :n], matrix[:n, n:] = A + B @ u_x, B @ u_z
-    rate = 1.0 / delay[:, None]
-    matrix[n:, :n] = 4.0 * rate * (K + D @ u_x)
-    matrix[n:, n:] = 4.0 * rate * (D @ u_z) - 2.0 * rate * np.eye(m)
-    names = (*free.coordinates.names, *(f"{a}.delay" for a in prepared.model.index.actuators))
-    state = np.concatenate([free.x, np.zeros(m)])
+    U, unit = np.zeros((m, total)), np.eye(total)
+    U[:, :n], U[:, z] = -direct[:, :n], np.eye(m)
+    U[:, n + m :] = -2.0 * (commands / periods) @ W
+    U = np.linalg.inv(np.eye(m) + direct[:, n:]) @ U
+    matrix = np.zeros((total, total))
+    matrix[:n] = B @ U
+    matrix[:n, :n] += A
+    matrix[z] = (2.0 * unit[z] - 4.0 * U) / (delay + step)[:, None]
+    matrix[n + m :] = 2.0 * W @ G @ np.concatenate([unit[:n], U])
+    matrix[n + m :, n + m :] += (2.0 / periods)[:, None] * (W @ (memory - np.eye(k)))
+    names = (*free.coordinates.names, *names)
+    state = np.concatenate([free.x, np.zeros(m + k)])
     w = free.coordinates.forceless
-    kept = np.setdiff1d(np.arange(n + m), w)
+    kept = np.setdiff1d(np.arange(total), w)
     names, state = tuple(names[k] for k in kept), state[kept]
     return Linearisation(names, without_forceless(matrix, w), state, speed)
 
@@ -90,8 +103,11 @@ def _rates_by_command(free: FreeVehicle) -> Floats:
 
 def _loop(
     linear: LinearVehicle, free: FreeVehicle, vehicle: Vehicle, settings: Settings, delay: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """What controllers give for a state: w = K x + D u, and its delays [s]."""
+) -> tuple[Floats, tuple[str, ...], Floats, Floats]:
+    """What controllers give, and remember, for a state, commands and memory before.
+
+    Its Jacobian, names of the delays and memories, periods of the memories and delays [s].
+    """
     model = with_control(linear.model, vehicle, settings)
     signals, controllers = model.system.signals, model.system.controllers
     plain, row = signals.codes.copy(), signals.row.copy()
@@ -104,29 +120,37 @@ def _loop(
         user_laws=model.system.user_laws,
     )
     where = system.actuators.codes[:, acts.COMMAND]
-    work, recorder = work_arrays(system), empty_recorder(linear.model, 1)
+    names = [f"{actuator}.delay" for actuator in model.index.actuators]
+    places, periods = list(where), []
+    for codes, (name, one) in zip(
+        controllers.codes, (vehicle.controllers or {}).items(), strict=True
+    ):
+        size, end = one.memory or 0, codes[kernel.CALLS]
+        places += range(end - size, end)  # a law's memory stands last in its block
+        names += [f"{name}.memory.{number}" for number in range(size)]
+        periods += [one.period] * size
+        begin, gives = codes[kernel.FIRST_PORT], codes[kernel.N_OUT]
+        wires = controllers.ports[begin : begin + gives + codes[kernel.N_IN]]
+        late = signals.row[wires[gives:], kernel.DELAY].max(initial=0.0)
+        held = signals.row[wires[gives:], kernel.PERIOD].max(initial=one.period)
+        delay[wires[:gives]] += 0.5 * held + late
+    work, recorder, n = work_arrays(system), empty_recorder(linear.model, 1), len(free.x)
 
-    def given(x: Floats, u: Floats) -> Floats:
-        """Commands for a state and commands before, by one call of the time loop."""
+    def given(before: Floats) -> Floats:
+        """Commands and memory after one call of the time loop."""
         state = free.state.copy()
-        state[free.coordinates.indices] = x
+        state[free.coordinates.indices] = before[:n]
         work.memory[:] = system.user_laws.memory
-        work.memory[kernel.RUN_START], work.memory[where] = state[TIME], u
+        work.memory[kernel.RUN_START], work.memory[places] = state[TIME], before[n:]
         rates, stages = np.zeros_like(state), np.zeros((3, len(state)))
         how = recorder, FAST, 1e-3, Chunk(0, 0, 1, 0, 1)
         status, *_ = time_loop(system, work, state, rates, stages, *how)
         if status != RUNNING:
             raise ModelError("a controller gives no finite command in steady rolling")
-        return np.array(work.memory[where])
+        return np.array(work.memory[places])
 
-    x, u = free.x, np.zeros(len(where))
-    steps = np.full(len(where), COMMAND_STEP)
-    K = jacobian(lambda rows: np.array([given(row, u) for row in rows]), x, free.coordinates.steps)
-    D = jacobian(lambda rows: np.array([given(x, row) for row in rows]), u, steps)
-    for c, one in enumerate(controllers.codes):
-        begin, gives = one[kernel.FIRST_PORT], one[kernel.N_OUT]
-        wires = controllers.ports[begin : begin + gives + one[kernel.N_IN]]
-        late = signals.row[wires[gives:], kernel.DELAY].max(initial=0.0)
-        held = signals.row[wires[gives:], kernel.PERIOD].max(initial=controllers.period[c])
-        delay[wires[:gives]] += 0.5 * held + late
-    return K, D, np.maximum(delay, 1e-6)
+    before = np.concatenate([free.x, np.zeros(len(places))])
+    of_memory = [COMMAND_STEP] * len(where) + [MEMORY_STEP] * len(periods)
+    steps = np.concatenate([free.coordinates.steps, of_memory])
+    loop = jacobian(lambda rows: np.array([given(row) for row in rows]), before, steps)
+    return loop, tuple(names), np.array(periods), np.maximum(delay, 1e-6)

@@ -27,6 +27,13 @@ def skyhook(time, v, c):
 
 
 @laws.controller
+def remembering(time, v, c, memory):
+    """Skyhook behind a filter of 0.1 s, at 5 ms."""
+    memory[0] += 0.05 * (v - memory[0])
+    return c * memory[0]
+
+
+@laws.controller
 def tilt(time, curvature, arm):
     return arm * curvature
 
@@ -43,17 +50,21 @@ def bogie_with(coach, actuator, *without):
     return {"bogie": {**bogie, "elements": {**elements, "act": {**ends, **actuator}}}}
 
 
-@pytest.mark.parametrize(("delay", "sampled"), [(0.0, {}), (0.02, {"rate": 10.0})])
-def test_skyhook_decays_as_its_linearised_loop(coach, delay, sampled):
+@pytest.mark.parametrize(
+    ("law", "delay", "sampled"),
+    [(skyhook, 0.0, {}), (skyhook, 0.02, {"rate": 10.0}), (remembering, 0.0, {})],
+)
+def test_skyhook_decays_as_its_linearised_loop(coach, law, delay, sampled):
     """The swaying mode alone, by its left eigenvector: decay within 1 %, frequency within 0.2 %.
 
     The controller is 500 times faster than the mode; its delay is in the linearisation, and so is
-    the time for which a sample of a slow signal is held, at the rear end alone.
+    the time for which a sample of a slow signal is held, at the rear end alone, and so is what a
+    controller remembers.
     """
     across = {"point": [0.0, 0.0, -0.7], "acts": "y", "delay": delay}
     vehicle = coach.replace(
         assemblies=bogie_with(coach, across, "secondary_lateral_damper"),
-        laws={"skyhook": laws.law(skyhook)},
+        laws={law.__name__: laws.law(law)},
         signals={
             end: {
                 "quantity": "velocity",
@@ -66,7 +77,8 @@ def test_skyhook_decays_as_its_linearised_loop(coach, delay, sampled):
         },
         controllers={
             end: {
-                "law": "skyhook",
+                "law": law.__name__,
+                "memory": 1 if law is remembering else None,
                 "period": 0.005,
                 "inputs": {"v": end},
                 "outputs": [f"{end}.act"],
