@@ -110,25 +110,26 @@ class Unit:
     def do_step(self, current_time: float, step_size: float) -> Any:
         """Advance by a step of communication."""
         outcome, status = self._wrapper.Fmi3StepResult, self._wrapper.Fmi3Status
-        run = self._run
+
+        def refused(why: str) -> Any:
+            self.log(why, status.error)
+            return outcome(status.error)
+
+        run = self._simulation
+        if run is None:
+            return refused("asked for a step before the initialisation, or after the end")
         if run.time == 0.0:  # the calling program's time at which the run begins
             self._begin = self._time = current_time
         if abs(self._time - current_time) > TIME_TOLERANCE * max(1.0, abs(current_time)):
-            self.log(
-                f"asked for a step at {current_time} s, the run is at {self._time} s", status.error
-            )
-            return outcome(status.error)
+            return refused(f"asked for a step at {current_time} s, the run is at {self._time} s")
         if not step_size > 0.0:
-            self.log(f"asked for a step of {step_size} s, allowed is more than 0", status.error)
-            return outcome(status.error)
+            return refused(f"asked for a step of {step_size} s, allowed is more than 0")
         if not run.running:
-            self.log(f"the run has ended before: {self._status}", status.error)
-            return outcome(status.error)
+            return refused(f"the run has ended before: {self._status}")
         try:
             self._command()
         except InputError as fault:  # the run goes on from here with commands that are right
-            self.log(str(fault), status.error)
-            return outcome(status.error)
+            return refused(str(fault))
         goes_on = run.step(step_size)
         self._read_outputs()
         if not goes_on:

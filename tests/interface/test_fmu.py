@@ -176,6 +176,17 @@ def test_a_wrong_command_is_an_error_after_which_the_run_goes_on(unit, tmp_path)
     assert called._time == pytest.approx(0.02)
 
 
+def test_a_step_out_of_turn_is_an_error_after_which_the_run_goes_on(unit, tmp_path):
+    """Before the initialisation and after the end; a fatal one may take the program with it."""
+    called = unpacked(unit, tmp_path)
+    assert called.do_step(0.0, 0.02).status.name == "error"
+    assert "initialisation" in called.logged[-1][0]
+    called.exit_initialization_mode()
+    assert called.do_step(0.0, 0.02).status.name == "ok"
+    called.terminate()
+    assert called.do_step(0.02, 0.02).status.name == "error"
+
+
 def test_a_state_can_be_written_from_the_begin_on(unit, tmp_path):
     """Ahead of the part of the run that is evaluated, and within a step: to the last bit."""
     called = unpacked(unit, tmp_path)
