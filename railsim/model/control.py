@@ -62,20 +62,24 @@ def with_control(model: Model, vehicle: Vehicle, settings: Settings) -> Model:
     """Return the model with the vehicle's signals and controllers.
 
     Raises InputError: names that mean nothing or two things; a law that is not permitted or cannot
-    be compiled; a step of the settings that is longer than a controller's period.
+    be compiled; a step of the settings longer than a controller's period or between two samples.
     """
     if not vehicle.signals and not vehicle.controllers:
         return model
     wiring = _Wiring(model, vehicle)
     quantities = {*QUANTITIES, *REQUESTED, *(settings.outputs.own or {})}
+    step = settings.step or 0.0  # one that is chosen is not longer than any of these
     for name, signal in (vehicle.signals or {}).items():
         same = name == signal.quantity and name in QUANTITIES and signal.side is None
         if name in quantities and not same:  # `Simulation.read` knows both by their names
             wiring.fault(f"signals.{name}", "the name of a quantity of results", "another name")
+        if step * (signal.rate or 0.0) > 1.0 + 1e-9:
+            found = f"found {signal.rate:.12g} 1/s, faster than the step of the settings"
+            wiring.fault(f"signals.{name}.rate", found, f"{1.0 / step:.12g} 1/s at most")
     for name, controller in (vehicle.controllers or {}).items():
-        if settings.step is not None and controller.period < settings.step * (1.0 - 1e-9):
+        if controller.period < step * (1.0 - 1e-9):
             found = f"found {controller.period:.12g} s, shorter than the step of the settings"
-            wiring.fault(f"controllers.{name}.period", found, f"{settings.step:.12g} s at least")
+            wiring.fault(f"controllers.{name}.period", found, f"{step:.12g} s at least")
     return wiring.model()
 
 

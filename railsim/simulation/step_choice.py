@@ -71,8 +71,8 @@ class StepChoice:
     `states`: steady rolling on straight track at the speeds where it is known; `inputs`: hash of
     all that the model was made of, friction apart, see `inputs_hash`; `on_straight`: of what counts
     on straight track; `progress`: called while a step is judged, as in
-    `railsim.simulation.flange.in_flange_contact`; `periods`: of controllers and samples: no step is
-    longer, and one that divides them is preferred [s].
+    `railsim.simulation.flange.in_flange_contact`; `periods`: of controllers and samples: no chosen
+    step is longer, and one that divides them is preferred [s].
     """
 
     def __init__(
@@ -114,17 +114,18 @@ class StepChoice:
         if self._settings.output_spacing is not None:
             interval = duration(self._settings.output_spacing, speed, rate)
         key = class_speed(speed) if self.varies else speed
+        periods = self._periods if self._settings.step is None else ()
         longest = self._longest.get(key) or self._choose(key, self._settings.output_interval(key))
         self._longest[key] = longest
         if self._settings.step is None:
             elastic = bool(self._model.system.support.elastic)
             waves = self._model.wheels.longest_step(speed, self._wave, elastic=elastic)
             braked = self._braked * min(1.0, ROLLING_SHARE * speed / FULL_BRAKE_SPEED)
-            longest = min(longest, waves, self._guided, braked, self._slipping * speed)
-        longest = min(longest, *self._periods, longest)
+            limits = waves, self._guided, braked, self._slipping * speed, *periods
+            longest = min(longest, *limits)
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
-        for finer in range(every, 2 * every + 1) if self._periods else ():
-            shares = [every_period / interval * finer for every_period in self._periods]
+        for finer in range(every, 2 * every + 1) if periods else ():
+            shares = [every_period / interval * finer for every_period in periods]
             if all(abs(share - round(share)) < WRITTEN for share in shares):
                 every = finer
                 break

@@ -363,6 +363,19 @@ def test_a_signal_may_have_the_name_of_what_it_measures(coach, track):
         assert sim.read("distance") == sim.distance
 
 
+def test_a_step_that_is_given_is_kept_or_refused(coach, track):
+    """1 ms does not divide 2.5 ms between samples, and is longer than 0.5 ms."""
+    settings = railsim.Settings(step=1e-3)
+    signal = {"quantity": "speed", "rate": 400.0}
+    vehicle = coach.replace(signals={"v": signal})
+    sim = railsim.Simulation(vehicle, track, speed=20.0, settings=settings)
+    assert sim.step_length == 1e-3
+    vehicle = coach.replace(signals={"v": {**signal, "rate": 2000.0}})
+    words = r"v.rate: found 2000 1/s, faster than the step.*; 1000 1/s at most"
+    with pytest.raises(InputError, match=words):
+        railsim.Simulation(vehicle, track, speed=20.0, settings=settings)
+
+
 def test_a_late_signal_stands_for_the_quantity_of_its_name(coach, track):
     """Of 20 samples a second 0.1 s late: after 0.32 s that of 0.2 s is known, 4 m at 20 m/s."""
     late = {"quantity": "distance", "rate": 20.0, "delay": 0.1}
