@@ -8,8 +8,9 @@ the controller's period T_c (Franklin, Powell, Workman 1998, Digital control of 
 6.3).  A command acts as u(t) = w(t - T), T being the actuator's delay, that of the slowest signal,
 a step of the loop, and half the time for which a command is held, the longest of the controller's
 period and the time between two samples of its signals (ibid., 4.4); the delay is that of Pade of
-order 1, (1 - T s/2)/(1 + T s/2).  Noise, resolution and limits are left out, and so is what a
-memory does that is not linear near 0, such as a counter.
+order 1, (1 - T s/2)/(1 + T s/2).  A damper has the constant that is commanded in steady rolling;
+what else a command does there to the steady state, noise, resolution and limits are left out, and
+so is what a memory does that is not linear near 0, such as a counter.
 """
 
 from typing import Any
@@ -21,7 +22,7 @@ from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import ModelError
 from railsim.kernels import actuators as acts
 from railsim.kernels import controllers as kernel
-from railsim.kernels.state import TIME
+from railsim.kernels.state import TIME, internal_begin
 from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.coordinates import FreeVehicle
@@ -58,8 +59,8 @@ def closed_loop(
     which[:, acts.SLOTS] = 0  # commands arrive at once, their delay is that of the loop
     free.system = free.system._replace(actuators=free.system.actuators._replace(codes=which))
     n = len(free.coordinates.names)
-    A, B = free.tangent(), _rates_by_command(free)
     loop, names, periods, delay = _loop(prepared, free, vehicle, settings or Settings(), delays)
+    A, B = free.tangent(), _rates_by_command(free)
     m, k = B.shape[1], len(periods)
     z, total = slice(n, n + m), n + m + k
     commands, memory, G = loop[:m, n + m :], loop[m:, n + m :], loop[m:, : n + m]
@@ -95,9 +96,10 @@ def _rates_by_command(free: FreeVehicle) -> Floats:
         memory[where] = commands
         return free.rate(free.x)
 
-    none = np.zeros(len(where))
-    found = jacobian(lambda rows: np.array([rate(row) for row in rows]), none, none + COMMAND_STEP)
-    memory[where] = none
+    steady = memory[where]
+    steps = np.full(len(where), COMMAND_STEP)
+    found = jacobian(lambda rows: np.array([rate(row) for row in rows]), steady, steps)
+    memory[where] = steady
     return found.reshape(len(free.x), -1)
 
 
@@ -106,7 +108,8 @@ def _loop(
 ) -> tuple[Floats, tuple[str, ...], Floats, Floats]:
     """What controllers give, and remember, for a state, commands and memory before.
 
-    Its Jacobian, names of the delays and memories, periods of the memories and delays [s].
+    Its Jacobian, names of the delays and memories, periods of the memories and delays [s]; the
+    vehicle has the commands of steady rolling from then on.
     """
     model = with_control(linear.model, vehicle, settings)
     signals, controllers = model.system.signals, model.system.controllers
@@ -150,6 +153,10 @@ def _loop(
         return np.array(work.memory[places])
 
     before = np.concatenate([free.x, np.zeros(len(places))])
+    steady, lags = given(before)[: len(where)], system.actuators.codes[:, acts.LAG_STATE]
+    free.work.memory[where] = steady
+    free.state[internal_begin(len(system.bodies.kind)) + lags[lags >= 0]] = steady[lags >= 0]
+    before = np.concatenate([free.x, steady, np.zeros(len(periods))])
     of_memory = [COMMAND_STEP] * len(where) + [MEMORY_STEP] * len(periods)
     steps = np.concatenate([free.coordinates.steps, of_memory])
     loop = jacobian(lambda rows: np.array([given(row) for row in rows]), before, steps)

@@ -34,6 +34,11 @@ def remembering(time, v, c, memory):
 
 
 @laws.controller
+def constant(time, c):
+    return c
+
+
+@laws.controller
 def tilt(time, curvature, arm):
     return arm * curvature
 
@@ -109,6 +114,29 @@ def test_skyhook_decays_as_its_linearised_loop(coach, law, delay, sampled):
     passive = eigenmodes(LinearVehicle(vehicle, track).linearised(20.0)).eigenvalues
     slow = min((e for e in passive if 1.0 < e.imag < 4.0), key=lambda e: e.imag)
     assert decay < 4.0 * slow.real  # the passive mode is hardly damped
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.05])
+def test_a_damper_commanded_to_be_constant_is_that_damper(coach, lag):
+    across = {"point": [0.0, 0.0, -0.7], "acts": "y", "command": "damper", "lag": lag}
+    one = {"law": "constant", "period": 0.005, "parameters": {"c": 30e3}}
+    commanded = coach.replace(
+        assemblies=bogie_with(coach, across, "secondary_lateral_damper"),
+        laws={"constant": laws.law(constant)},
+        controllers={"c": {**one, "outputs": ["front.act", "rear.act"]}},
+    )
+    damper = {"kind": "bushing", "point": across["point"], "damping": [0.0, 30e3, 0.0]}
+    passive = coach.replace(assemblies=bogie_with(coach, damper, "secondary_lateral_damper"))
+    track = railsim.load_track("straight").replace(support={"preset": "rigid"})
+    found, expected = (
+        np.sort_complex([e for e in eigenmodes(one).eigenvalues if 1.0 < e.imag < 7.0])
+        for one in (
+            closed_loop(commanded, track, 20.0, step=1e-3),
+            LinearVehicle(passive, track).linearised(20.0),
+        )
+    )
+    assert len(expected) > 2
+    assert found == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
