@@ -152,14 +152,13 @@ def write_actuator_output(system, work, state, index, e, out):
 
 @compiled(python=False)
 def track_signal(system, state, i):
-    """Curvature [1/m] or cant angle [rad] of the track ahead; 0 beyond the end of its table."""
-    codes = system.signals.codes
-    lookahead = system.signals.row[i, LOOKAHEAD]
-    cell, u = track_cell(system.track, state[ARC_LENGTH] + lookahead)
-    if cell < 0:
-        return 0.0
+    """Curvature [1/m] or cant angle [rad] of the track ahead; beyond its table that at the end."""
+    codes, track = system.signals.codes, system.track
+    c = track.coefficients
+    s = state[ARC_LENGTH] + system.signals.row[i, LOOKAHEAD]
+    last = track.s_start + (1.0 - 1e-9) * c.shape[0] * track.ds  # within the last cell
+    cell, u = track_cell(track, max(track.s_start, min(last, s)))
     row = PSI if codes[i, KIND] == CURVATURE else PHI
-    c = system.track.coefficients
     value, slope, _ = polynomial(
         c[cell, row, 0], c[cell, row, 1], c[cell, row, 2], c[cell, row, 3], u
     )

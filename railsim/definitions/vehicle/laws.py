@@ -93,7 +93,7 @@ class Signal(base.Definition):
     axis: Literal["x", "y", "z", "roll", "pitch", "yaw"] | None = None
     """Axis; of a link its line, by default"""
     ahead: base.Finite = 0.0
-    """Position on the track, ahead of the reference body [m]"""
+    """Position on the track, ahead of the reference body [m]; the track goes on as it ends"""
     rate: Annotated[base.Positive, Field(le=1e6)] | None = None
     """Samples per second [1/s]; by default one each step of the loop"""
     delay: base.NonNegative = 0.0
