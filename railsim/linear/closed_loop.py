@@ -9,8 +9,9 @@ the controller's period T_c (Franklin, Powell, Workman 1998, Digital control of 
 a step of the loop, and half the time for which a command is held, the longest of the controller's
 period and the time between two samples of its signals (ibid., 4.4); the delay is that of Pade of
 order 1, (1 - T s/2)/(1 + T s/2).  A damper has the constant that is commanded in steady rolling;
-what else a command does there to the steady state, noise, resolution and limits are left out, and
-so is what a memory does that is not linear near 0, such as a counter.
+where the contact is linearised for an amplitude, wheelsets hunt as with commands that stay.  What
+else a command does to the steady state, noise, resolution, limits, and what a memory does that is
+not linear near 0, such as a counter, are left out.
 """
 
 from typing import Any
@@ -60,7 +61,7 @@ def closed_loop(
     free.system = free.system._replace(actuators=free.system.actuators._replace(codes=which))
     n = len(free.coordinates.names)
     loop, names, periods, delay = _loop(prepared, free, vehicle, settings or Settings(), delays)
-    A, B = free.tangent(), _rates_by_command(free)
+    A, B = prepared.for_amplitude(free, free.tangent()), _rates_by_command(free)
     m, k = B.shape[1], len(periods)
     z, total = slice(n, n + m), n + m + k
     commands, memory, G = loop[:m, n + m :], loop[m:, n + m :], loop[m:, : n + m]

@@ -242,11 +242,15 @@ class LinearVehicle:
         if speed not in self._tangents:
             vehicle = self.free(speed)
             self._tangents[speed] = vehicle, vehicle.tangent()
-        vehicle, matrix = self._tangents[speed]
+        vehicle, tangent = self._tangents[speed]
+        return vehicle.linearisation(self.for_amplitude(vehicle, tangent, path))
+
+    def for_amplitude(
+        self, vehicle: FreeVehicle, tangent: Floats, path: ContactPath | None = None
+    ) -> Floats:
+        """Return a tangent, or where `contact` or `path` have an amplitude the matrix for it."""
         path = path or self._path
-        if path is not None:
-            matrix = path.matrix(vehicle, matrix)
-        return vehicle.linearisation(matrix)
+        return path.matrix(vehicle, tangent) if path else tangent
 
 
 def on_cones(vehicle: Vehicle, conicity: float) -> tuple[Vehicle, Profile]:
