@@ -23,8 +23,9 @@ from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import ModelError
 from railsim.kernels import actuators as acts
 from railsim.kernels import controllers as kernel
-from railsim.kernels.state import TIME, internal_begin
+from railsim.kernels.state import ARC_LENGTH, SPEED, TIME, internal_begin, velocity_begin
 from railsim.kernels.status import RUNNING
+from railsim.kernels.system import Bodies
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.system import Linearisation, jacobian, without_forceless
@@ -104,6 +105,14 @@ def _rates_by_command(free: FreeVehicle) -> Floats:
     return found.reshape(len(free.x), -1)
 
 
+def _carry(state: Floats, bodies: Bodies) -> None:
+    """Let the track frames move along as the reference body does, as in a run, not it in them."""
+    for begin, place in ((0, ARC_LENGTH), (velocity_begin(len(bodies.kind)), SPEED)):
+        along = state[begin + 6 * bodies.reference]
+        state[place] += along
+        state[begin + 6 * bodies.whole] -= along
+
+
 def _loop(
     linear: LinearVehicle, free: FreeVehicle, vehicle: Vehicle, settings: Settings, delay: Floats
 ) -> tuple[Floats, tuple[str, ...], Floats, Floats]:
@@ -117,8 +126,7 @@ def _loop(
     plain, row = signals.codes.copy(), signals.row.copy()
     plain[:, kernel.SLOTS] = 0
     row[:, [kernel.PERIOD, kernel.DELAY, kernel.NOISE, kernel.RESOLUTION]] = 0.0
-    system = linear.system._replace(
-        actuators=free.system.actuators,
+    system = free.system._replace(
         signals=signals._replace(codes=plain, row=row),
         controllers=controllers,
         user_laws=model.system.user_laws,
@@ -144,6 +152,7 @@ def _loop(
         """Commands and memory after one call of the time loop."""
         state = free.state.copy()
         state[free.coordinates.indices] = before[:n]
+        _carry(state, system.bodies)
         work.memory[:] = system.user_laws.memory
         work.memory[kernel.RUN_START], work.memory[places] = state[TIME], before[n:]
         rates, stages = np.zeros_like(state), np.zeros((3, len(state)))

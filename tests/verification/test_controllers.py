@@ -39,6 +39,11 @@ def constant(time, c):
 
 
 @laws.controller
+def keeper(time, speed, wanted, k):
+    return k * (wanted - speed)
+
+
+@laws.controller
 def tilt(time, curvature, arm):
     return arm * curvature
 
@@ -139,6 +144,28 @@ def test_a_damper_commanded_to_be_constant_is_that_damper(coach, lag, contact):
     )
     assert len(expected) > 2
     assert found == pytest.approx(expected, rel=1e-6)
+
+
+def test_speed_is_kept_as_that_of_a_mass():
+    """m v' = -m w v(t - T), T half the period and a step: s (1 + s T/2) + w (1 - s T/2) = 0."""
+    car, w, delay = railsim.load_vehicle("metro_b_motor"), 0.5, 0.026
+    bogie = car.assemblies["bogie"].model_dump(exclude_none=True)
+    motor = {"kind": "actuator", "bodies": ["frame", "wheelset"], "acts": "axle"}
+    bogie["assemblies"]["axle"]["elements"]["motor"] = motor
+    mass, radius = 35396.0 + 4.0 * 104.0 / 0.42**2, 0.42  # with the turning wheels
+    motors = [f"{b}.{a}.motor" for b in ("front", "rear") for a in ("outer", "inner")]
+    one = {"law": "keeper", "period": 0.05, "inputs": {"speed": "v"}, "outputs": motors}
+    vehicle = car.replace(
+        assemblies={"bogie": bogie},
+        laws={"keeper": laws.law(keeper)},
+        signals={"v": {"quantity": "speed"}},
+        controllers={"c": {**one, "parameters": {"wanted": 18.0, "k": mass * w * radius / 4.0}}},
+    )
+    track = railsim.load_track("straight").replace(support={"preset": "rigid"})
+    found = np.linalg.eigvals(closed_loop(vehicle, track, 18.0, step=1e-3).matrix)
+    place, speed = sorted(found, key=abs)[:2]
+    assert abs(place) < 1e-6  # where it is along the track, nothing depends on
+    assert speed == pytest.approx(max(np.roots([delay / 2, 1.0 - delay / 2 * w, w])), rel=0.005)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
