@@ -14,6 +14,7 @@ import numpy as np
 
 from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError
+from railsim.kernels import actuators as acts
 from railsim.kernels.creep import FASTRIP, FASTSIM, LINEAR
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import N_SCALARS, SPEED, internal_begin, velocity_begin
@@ -132,7 +133,11 @@ def _internal_names(model: Model) -> list[str]:
     names = dict(zip(system.links.internal.tolist(), index.links, strict=True))
     rows = zip(index.mounts, system.mounts.internal.tolist(), strict=True)
     names |= {i: f"{name}.{axis}" for name, row in rows for axis, i in zip("xyz", row, strict=True)}
-    return [names.get(i, "") for i in range(len(system.internal.kind))]
+    for name, row in zip(index.actuators, system.actuators.codes.tolist(), strict=True):
+        names[row[acts.LAG_STATE]] = f"{name}.lag"
+        own, first = range(row[acts.USER_STATES]), row[acts.USER_STATE]
+        names |= {first + k: f"{name}.state_{k + 1}" for k in own}
+    return [names[i] for i in range(len(system.internal.kind))]
 
 
 class FreeVehicle:
