@@ -8,10 +8,10 @@ the controller's period T_c (Franklin, Powell, Workman 1998, Digital control of 
 6.3).  A command acts as u(t) = w(t - T), T being the actuator's delay, that of the slowest signal,
 a step of the loop, and half the time for which a command is held, the longest of the controller's
 period and the time between two samples of its signals (ibid., 4.4); the delay is that of Pade of
-order 1, (1 - T s/2)/(1 + T s/2).  A damper has the constant that is commanded in steady rolling;
-where the contact is linearised for an amplitude, wheelsets hunt as with commands that stay.  What
-else a command does to the steady state, noise, resolution, limits, and what a memory does that is
-not linear near 0, such as a counter, are left out.
+order 1, (1 - T s/2)/(1 + T s/2), good for w T up to 1.  A damper has the constant that is
+commanded in steady rolling; where the contact is linearised for an amplitude, wheelsets hunt as
+with commands that stay.  What else a command does to the steady state, noise, resolution, limits,
+and what a memory does that is not linear near 0, such as a counter, are left out.
 """
 
 from typing import Any
