@@ -155,7 +155,7 @@ def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["
 
 
 json_option = flag("--json as_json", "Machine-readable results on stdout.")
-quiet_option = flag("--quiet", "No progress bars; remarks only on what is damaged or left out.")
+quiet_option = flag("--quiet", "No progress bars and fewer remarks.")
 overwrite_option = flag("--overwrite", "Replace output that exists.")
 set_option = repeated("--set assignments", "Replace a value; may be repeated.", "KEY.PATH=VALUE")
 load_option = option("--load", "Load case of the vehicle; by default its design load.", "NAME")
@@ -423,7 +423,7 @@ class Output:
             yield {"overwrite": self.overwrite, "progress": progress, "on_remark": self.remark}
 
     def remark(self, text: object) -> None:
-        """Print a remark on stderr, also if quiet: on what is damaged or left out."""
+        """Print a remark on stderr, also if quiet."""
         echo(f"remark: {text}", err=True)
 
     def wrote(self, path: str | Path, **facts: Any) -> None:
