@@ -15,6 +15,7 @@ from railsim.arrays import Floats, Integers, stretches
 from railsim.errors import input_error
 
 JUMP = 1.5  # steps, from which on a time step is a gap
+INTERPOLATED = 2.0  # as many times as long where values are interpolated
 ROUNDED = 0.25  # steps
 MOST_LOST = 50.0  # times the values that there are
 FEWEST_LONG = 0.04  # share of double steps in a clock of few digits; seldom ones are lost values
@@ -44,7 +45,7 @@ class Clock:
         t = self.written[valid]
         values = np.interp(self.time, t, x[valid], np.nan, np.nan)
         after = np.clip(np.searchsorted(t, self.time), 1, len(t) - 1)
-        values[t[after] - t[after - 1] > 2.0 * JUMP / self.rate] = np.nan
+        values[t[after] - t[after - 1] > INTERPOLATED * JUMP / self.rate] = np.nan
         return values
 
 
@@ -88,10 +89,10 @@ def clock_of(file: str, times: Floats) -> Clock:
         deviation = max(deviation, float(np.abs(piece - times[0] - (first + count) * step).max()))
         begin = end + 1
     rising = bool((np.diff(places) > 0).all())
-    remarks = []
-    if len(ends):
-        remarks.append(f"The record has {len(ends)} gaps, together {steps[ends].sum():.3g} s.")
-    if rising and deviation < (ROUNDED + 0.5 * bool(len(ends))) * step:
+    on_line = rising and deviation < (ROUNDED + 0.5 * bool(len(ends))) * step
+    gaps = steps[steps > (1.0 if on_line else INTERPOLATED) * JUMP * median]
+    remarks = [f"The record has gaps: {len(gaps)}, together {gaps.sum():.3g} s."] * bool(len(gaps))
+    if on_line:
         time = times[0] + step * np.arange(places[-1] - places[0] + 1)
         return Clock(time, 1.0 / step, places - places[0], times, tuple(remarks))
     remarks.append(

@@ -7,6 +7,7 @@ best shift in time, the ratio of the rms values, and how the shift changes over 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
+from statistics import median_high, median_low
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class Likeness:
             return f"{name}: its clock runs apart by {1e3 * self.drift:.3g} ms over the record."
         if self.correlation > SURE and abs(self.lag) > APART * step:
             late = f"{1e3 * abs(self.lag):.3g} ms {'later' if self.lag > 0.0 else 'earlier'}"
-            return f"{name} comes {late} than simulated: 'delay'?"
+            return f"{name} comes {late} than simulated: 'delay', or its place on the vehicle?"
         return ""
 
 
@@ -121,19 +122,29 @@ def suspicions(
     phases are not right yet.
     """
     likenesses = {name: likeness(measured[name], simulated[name], step) for name in measured}
-    clear = [like.lag for like in likenesses.values() if like.correlation > SURE]
-    common = float(np.median(clear)) if clear else 0.0
+    clear = {name: like.lag for name, like in likenesses.items() if like.correlation > SURE}
+    low, high = (median(clear.values() or [0.0]) for median in (median_low, median_high))
     drifts = [like.drift for like in likenesses.values() if np.isfinite(like.drift)]
     drift = float(np.median(drifts)) if len(drifts) > 1 else 0.0
-    exchanged = _exchanged(likenesses, measured, simulated, quantities, step)
+    lags = {n: k.lag - (high if k.lag >= high else low) for n, k in likenesses.items()}
+    exchanged = _exchanged(likenesses, lags, measured, simulated, quantities, step)
     texts = []
     for name, like in likenesses.items():
         if name in exchanged:
             texts.append(f"{name} is like the simulated {exchanged[name]}, not its own: exchanged?")
             continue
-        corrected = {"lag": clocks * (like.lag - common), "drift": clocks * (like.drift - drift)}
+        corrected = {"lag": clocks * lags[name], "drift": clocks * (like.drift - drift)}
         sided = quantities[name].endswith(SIDES)
         texts.append(replace(like, **corrected).remark(name, step, sided=sided))
+    if clocks and high - low > APART * step and not exchanged:  # half of them, half of them
+        earlier, later = (
+            ", ".join(n for n, lag in clear.items() if abs(lag - end) <= APART * step)
+            for end in (low, high)
+        )
+        texts.append(
+            f"{later} against {earlier}: {1e3 * (high - low):.3g} ms later than simulated. With as "
+            "many channels on either side it is open which are wrong: 'delay'?"
+        )
     if clocks and abs(drift) > APART * step:
         texts.append(
             f"All channels run apart from the simulation by {1e3 * drift:.3g} ms over the "
@@ -144,6 +155,7 @@ def suspicions(
 
 def _exchanged(
     likenesses: Mapping[str, Likeness],
+    lags: Mapping[str, float],
     measured: Series,
     simulated: Series,
     quantities: Mapping[str, str],
@@ -151,10 +163,15 @@ def _exchanged(
 ) -> dict[str, str]:
     """Return pairs of channels of one quantity that are each like the other's simulated one.
 
-    They are less like their own, of either sign: loads of both sides are opposite in curves.
+    They are less like their own, of either sign: loads of both sides are opposite in curves; or
+    they come too early and too late by `lags`, as of two places one behind the other.
     """
     pairs: dict[str, str] = {}
-    unlike = (name for name, like in likenesses.items() if like.correlation < ALIKE)
+    unlike = [
+        name
+        for name, like in likenesses.items()
+        if like.correlation < ALIKE or abs(lags[name]) > APART * step
+    ]
     for pair in combinations(unlike, 2):
         kinds = {quantities[name].partition(":")[0] for name in pair}
         if len(kinds) == 1 and all(

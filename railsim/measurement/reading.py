@@ -70,7 +70,7 @@ def load_measurement(
             channel.factor * (part - channel.offset) for part in parts[times[0]]
         ])  # fmt: skip
         if restarts:
-            remarks.append(f"The clock begins anew in {restarts} files; they follow each other.")
+            remarks.append(f"Files whose clock begins anew: {restarts}; they follow each other.")
         clock = clock_of(setup.file[0], times_read)
     else:
         count = sum(map(len, parts[names[0]]))

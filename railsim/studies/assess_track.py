@@ -138,12 +138,12 @@ class TrackAssessment:
     @property
     def notes(self) -> tuple[str, ...]:
         """Misses and false alarms in words."""
-        both, missed, false, none, left = self.flagged.tolist()
-        not_run = f" Over {left} sections some vehicle did not run." if left else ""
+        both, missed, false, _, left = self.flagged.tolist()
+        not_run = f"; not run over by all vehicles: {left}" if left else ""
         return (
-            f"Of {both + missed + false + none} sections of {SECTION:g} m, {both} are flagged by "
-            f"vehicles and geometry, {missed} only by vehicles (missed by geometry limits), "
-            f"{false} only by geometry (false alarms).{not_run}",
+            f"Sections of {SECTION:g} m: {sum(self.flagged)}; flagged by vehicles and geometry: "
+            f"{both}; only by vehicles (missed by geometry limits): {missed}; only by geometry "
+            f"(false alarms): {false}{not_run}.",
             UNCHECKED,
             *self.remarks,
         )

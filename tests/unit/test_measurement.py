@@ -313,6 +313,32 @@ def test_exchanged_channels_are_told_from_reversed_ones(shared):
     assert not [words for words in other if "exchanged" in words]
 
 
+@pytest.mark.parametrize(("late", "pair"), [("Q", "Q, R against Y, Z"), ("Y", "Y against Z")])
+def test_whose_clock_is_wrong_is_open_where_as_many_channels_are_late_as_not(late, pair):
+    """Each was said to be off by half of it, the late ones and the others."""
+    series = dict(zip("QRYZ", np.random.default_rng(6).standard_normal((4, 4000)), strict=True))
+    chosen = "QRYZ" if late == "Q" else "YZ"
+    simulated = {name: np.convolve(series[name], np.hanning(9), "same") for name in chosen}
+    behind = pair.split(" ")[0] if late == "Y" else "QR"
+    measured = {n: np.roll(x, 10 * (n in behind)) for n, x in simulated.items()}
+    (found,) = suspicions(measured, simulated, dict.fromkeys(chosen, "sum_Y:1"), 0.01)
+    assert found.startswith(f"{pair}: 100 ms later than simulated.")
+
+
+def test_channels_of_two_places_one_behind_the_other_are_exchanged_and_not_late():
+    """What the rear one reads comes 0.2 s later; both were said to have another clock."""
+    a, noise = np.random.default_rng(7).standard_normal((2, 4000))
+    front = np.convolve(a, np.hanning(9), "same")
+    rear = np.roll(front, 20) + 0.3 * np.convolve(noise, np.hanning(9), "same")
+    simulated = {"f": front, "r": rear, "Y": np.convolve(noise, np.hanning(9), "same")}
+    quantities = {"f": "sum_Y:1", "r": "sum_Y:2", "Y": "Y:1:left"}
+    found = suspicions(simulated | {"f": rear, "r": front}, simulated, quantities, 0.01)
+    assert found == ["f is like the simulated r, not its own: exchanged?",
+                     "r is like the simulated f, not its own: exchanged?"]  # fmt: skip
+    late = suspicions(simulated | {"r": np.roll(rear, 20)}, simulated, quantities, 0.01)
+    assert late == ["r comes 200 ms later than simulated: 'delay', or its place on the vehicle?"]
+
+
 def test_resampling_keeps_what_is_slow_and_folds_nothing(tmp_path):
     run = railsim.load_measurement(written(tmp_path)).resampled(50.0)
     inner = slice(20, -20)

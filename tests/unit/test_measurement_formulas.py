@@ -330,7 +330,20 @@ def test_a_distance_that_contradicts_the_speed_or_falls_is_refused(share, back, 
 def test_a_step_of_one_and_a_half_is_a_gap(extra, gap):
     written = 0.01 * (np.arange(200) + extra * (np.arange(200) >= 100))
     said = "".join(clock_of("made", written).remarks)
-    assert ("The record has 1 gaps, together 0.016 s" in said) is gap
+    assert ("The record has gaps: 1, together 0.016 s" in said) is gap
+
+
+def test_a_clock_that_trembles_has_no_gaps():
+    """Steps of 0.2 to 1.8 means, none lost: each above 1.5 was said to be a gap."""
+    places = np.arange(2000)
+    trembling = places + np.random.default_rng(1).uniform(-0.4, 0.4, 2000)
+    found = clock_of("made", 0.005 * trembling)
+    assert [words[:15] for words in found.remarks] == ["The time steps "]
+    assert np.isfinite(found.on_grid(found.written)).all()
+    kept = trembling[(places < 700) | (places >= 900)]
+    lost = clock_of("made", 0.005 * kept)
+    assert lost.remarks[0].startswith("The record has gaps: 1, together 1 s")
+    assert np.isnan(lost.on_grid(lost.written)).sum() == pytest.approx(200, abs=3)
 
 
 @pytest.mark.parametrize("long", [2, 3])
