@@ -2,8 +2,10 @@
 
 The weighted residuals r(x) of all runs are minimised (trust region reflective, Branch, Coleman, Li
 1999, SIAM J. Sci. Comput. 21, 1), with J their derivatives: the covariance of the coordinates is
-(J^T J)^-1, times the mean square of the residuals where that is above what the noise explains.  A
-singular value s of J says that the combination of parameters along its vector is known to 1/s.
+(J^T J)^-1 J^T E^-1 J (J^T J)^-1, times the mean square of the residuals where that is above what
+the noise explains; E is the share of independent values in each residual, less than 1 by faded ends
+and gaps.  A singular value s of E^(1/2) J says that the combination of parameters along its vector
+is known to 1/s.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -244,12 +246,15 @@ def _covariance(problem: Problem, x: Floats, jacobian: Floats, loss: str) -> tup
     counting = _counting(vector, loss)
     jacobian = np.sqrt(counting)[:, None] * jacobian
     square = float(counting[:data] @ vector[:data] ** 2)
-    square /= max(1.0, float(np.sum(counting[:data])) - problem.size)
+    independent = problem.independent(x)
+    fitted = problem.size / float(np.mean(independent[:data]))
+    square /= max(1.0, float(np.sum(counting[:data])) - fitted)
     inflation = max(1.0, square)  # what the noise that is stated does not explain is noise too
-    _, singular, right = np.linalg.svd(jacobian, full_matrices=False)
+    left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
     with np.errstate(divide="ignore"):
         inverse = np.where(singular > 1e-10 * singular[0], 1.0 / singular, 1e6)
-    return inflation * (right.T * inverse**2) @ right, inflation
+    half = inverse[:, None] * right
+    return inflation * half.T @ (left.T / independent @ left) @ half, inflation
 
 
 def _best_shares(problem: Problem, x: Floats) -> Floats:
@@ -326,7 +331,8 @@ def _outcome(
     if without_effect.any() and np.abs(problem.vector(reset) - problem.vector(x)).max() < SILENT:
         x = reset
     covariance, inflation = _covariance(problem, x, jacobian, loss)
-    jacobian = np.sqrt(_counting(problem.vector(x), loss))[:, None] * jacobian
+    telling = _counting(problem.vector(x), loss) * problem.independent(x)
+    jacobian = np.sqrt(telling)[:, None] * jacobian
     data = len(jacobian) - len(problem.before(x))
     channels = []
     series = zip(
@@ -335,9 +341,10 @@ def _outcome(
     )  # fmt: skip
     for p, rows, weights, before, after in series:
         wholes = problem.form.features(p, p.measured, measured=True)
+        shares = problem.form.independent(p)
         for j, (name, row, whole) in enumerate(zip(p.names, rows, wholes, strict=True)):
             tested = problem.form.kind == "history" and _rms(row) > NEGLIGIBLE * _rms(whole)
-            test = whiteness(row) if tested else (np.nan, np.nan)
+            test = whiteness(row, shares[j]) if tested else (np.nan, np.nan)
             channels.append(Channel(
                 p.run.name, name, p.run.selections[j], p.step, p.run.at,
                 p.measured[j], before[j], after[j], _rms(weights[j] * row), *test,

@@ -206,6 +206,15 @@ class Problem:
         ]
         return np.concatenate([*rows, self.before(x)])
 
+    def independent(self, x: Floats) -> Floats:
+        """Return the share of independent values in each residual of `vector`."""
+        shares = [
+            np.full(len(row), share)
+            for prepared, rows in zip(self.runs, self.residuals(x), strict=True)
+            for row, share in zip(rows, self.form.independent(prepared), strict=True)
+        ]
+        return np.concatenate([*shares, np.ones(len(self._prior))])
+
     def vectors(self, points: Sequence[Floats]) -> list[Floats]:
         """Return `vector` at several points, which are simulated together."""
         self._simulate([(x, k, self.place) for x in points for k in range(len(self.runs))])

@@ -3,8 +3,8 @@
 ``history``
     The difference over time, as its Fourier coefficients in the band: for white noise they are
     independent, so that no filter colours the residuals and their number is that of the
-    independent values.  Means do not count, gaps are no difference; both ends fade by half a
-    cosine.
+    independent values, but for what gaps and ends take (`Form.independent`).  Means do not count,
+    gaps are no difference; both ends fade by half a cosine.
 ``spectra``
     Logarithms of the rms values in third-octave bands, simulated ones with the noise that is stated
     of a channel: where the place on the track, or the track itself, is known by its spectrum only.
@@ -82,12 +82,29 @@ class Form:
         """Return standard deviations of each channel's features by the noise stated, or NaN."""
         if self.kind != "history":
             return np.full(len(prepared.noise), np.nan)
-        return prepared.noise * _density(prepared, self.band)
+        return prepared.noise * _density(prepared, self.band) * _weights(prepared, 2) ** 0.5
+
+    def independent(self, prepared: PreparedRun) -> Floats:
+        """Return the share of independent values in the features of each channel.
+
+        With weights w over time (the faded ends, 0 in gaps) white noise gives N = sum(w^2)^2 /
+        sum(w^4) independent values: a mean of squares over them varies as one over N values.
+        """
+        if self.kind != "history":
+            return np.ones(len(prepared.names))
+        return _weights(prepared, 2) ** 2 / np.maximum(_weights(prepared, 4), 1e-300)
 
 
 def _density(prepared: PreparedRun, band: tuple[float, float]) -> float:
     """Standard deviation of white noise over all frequencies for 1 in the band [1]."""
     return float(np.sqrt(0.5 / prepared.step / (band[1] - band[0])))
+
+
+def _weights(prepared: PreparedRun, power: int) -> Floats:
+    """Mean over time of a power of what each channel is multiplied by: the fade, 0 in gaps."""
+    valid = np.isfinite(prepared.measured)
+    means: Floats = np.mean(valid * _fade(valid.shape[1], prepared.step) ** power, axis=1)
+    return means
 
 
 def _fade(n: int, step: float) -> Floats:
@@ -110,13 +127,13 @@ def banded(x: Floats, step: float, band: tuple[float, float]) -> Floats:
     return np.where(valid, np.fft.irfft(spectrum, n), np.nan)
 
 
-def whiteness(residual: Floats) -> tuple[float, float]:
+def whiteness(residual: Floats, independent: float = 1.0) -> tuple[float, float]:
     """Return statistic and probability of white residuals, by their cumulative periodogram.
 
     Of Fourier coefficients (real parts, then imaginary parts): the largest distance of the sum of
     their squares over frequency from a straight line, times the root of their number, has the
     distribution of Kolmogorov and Smirnov where the residuals are white (Bartlett 1955, An
-    Introduction to Stochastic Processes, section 9.2).
+    Introduction to Stochastic Processes, section 9.2).  `independent`: share of independent ones.
 
     >>> rng = np.random.default_rng(1)
     >>> whiteness(rng.standard_normal(2000))[1] > 0.05
@@ -132,5 +149,5 @@ def whiteness(residual: Floats) -> tuple[float, float]:
         return 0.0, 1.0
     cumulative = np.cumsum(power) / total
     line = np.arange(1, len(power) + 1) / len(power)
-    statistic = float(np.max(np.abs(cumulative - line)) * np.sqrt(len(power)))
+    statistic = float(np.max(np.abs(cumulative - line)) * np.sqrt(independent * len(power)))
     return statistic, float(kstwobign.sf(statistic))

@@ -39,7 +39,9 @@ TRACK = railsim.load_track("straight", [f"irregularities=[{WAVES}]", "plan.0.len
 def test_what_the_data_do_not_show_is_unknown_at_any_noise(noise):
     """A parameter that acts 1e-13 as much as the other, which is known as well as the channels."""
     derivatives = np.array([[1.0, 0.0], [0.0, 1e-13], [0.0, 0.0], [0.0, 0.0]]) / noise
-    problem = SimpleNamespace(size=2, vector=lambda x: np.zeros(4), before=lambda x: [])
+    problem = SimpleNamespace(
+        size=2, vector=lambda x: np.zeros(4), before=lambda x: [], independent=lambda x: np.ones(4)
+    )
     covariance, inflation = _covariance(problem, np.zeros(2), derivatives, "linear")
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), [noise, 1e6], rtol=1e-6)
     assert inflation == 1.0

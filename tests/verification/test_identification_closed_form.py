@@ -87,20 +87,25 @@ def identified(ready, parameters, place=True, loss="linear"):
     return _solve(problem, loss)
 
 
-def projection():
-    """Rows that take the mean off a record, fade one second of each end, and give the band."""
+def projection(present=None):
+    """Rows that take the mean off a record, fade one second of each end, and give the band.
+
+    And the share of independent values that the ends leave; `present`: where there are values.
+    """
     edge = round(1.0 / STEP)
     fade = np.ones(N)
     fade[:edge] = np.sin(0.5 * np.pi * (np.arange(edge) + 0.5) / edge) ** 2
     fade[-edge:] = fade[:edge][::-1]
     fade *= np.sqrt(N / np.sum(fade**2))
+    share = np.mean(fade**2) ** 2 / np.mean(fade**4)
     f = np.arange(N // 2) / (N * STEP)
     turns = 2.0 * np.pi * f[(f >= BAND[0]) & (f <= BAND[1]), None] * STEP * np.arange(N)
     rows = np.vstack([np.cos(turns), -np.sin(turns)]) * np.sqrt(2.0 / N)
-    return (rows * fade) @ (np.eye(N) - 1.0 / N)
+    there = np.ones(N) if present is None else present
+    return (rows * fade * there) @ (np.eye(N) - there / np.sum(there)), share
 
 
-ROWS = projection()
+ROWS, INDEPENDENT = projection()
 
 
 def vector(ready, z, place=True, spread=None):
@@ -124,7 +129,12 @@ def vector(ready, z, place=True, spread=None):
     always=(1, 2),
 )
 def test_solution_and_covariance_are_those_of_least_squares(place, spread, noise):
-    """Above the noise that is stated, what is left is noise too: a factor on the covariance."""
+    """Above the noise that is stated, what is left is noise too: a factor on the covariance.
+
+    The residuals of white noise have the covariance R R^T, R their projection: that of the solution
+    is (J^T J)^-1 J^T R R^T J (J^T J)^-1, and about that of so many independent values as the faded
+    ends leave.
+    """
     ready = runs(np.random.default_rng(7), noise)
     if not place:
         ready = [one.moved(*at) for one, at in zip(ready, PLACES, strict=True)]
@@ -133,8 +143,13 @@ def test_solution_and_covariance_are_those_of_least_squares(place, spread, noise
     begin = [0.2, -0.3, *([0.8, 3.0, -1.1, -2.0] if place else [])]
     best = optimize.least_squares(lambda z: vector(ready, z, place, spread), begin, x_scale="jac")
     count = len(best.fun) - (spread is not None)
-    square = np.sum(best.fun[:count] ** 2) / (count - len(begin))
-    covariance = max(1.0, square) * np.linalg.inv(best.jac.T @ best.jac)
+    square = np.sum(best.fun[:count] ** 2) / (count - len(begin) / INDEPENDENT)
+    inverse, J = np.linalg.inv(best.jac.T @ best.jac), best.jac[:count]
+    before = best.jac[count:].T @ best.jac[count:]
+    covariance = max(1.0, square) * inverse @ (J.T @ J / INDEPENDENT + before) @ inverse
+    noisy = sum(part.T @ ROWS @ ROWS.T @ part for part in np.split(J, 4))
+    exact = max(1.0, square) * inverse @ (noisy + before) @ inverse
+    assert one.deviations == pytest.approx(np.sqrt(np.diag(exact))[:2], rel=0.01)
     deviations = np.sqrt(np.diag(covariance))
     assert np.abs(one.x - best.x[:2]) == pytest.approx(0.0, abs=0.05 * deviations[:2].min())
     assert one.inflation == pytest.approx(max(1.0, square), rel=1e-3)
@@ -148,8 +163,7 @@ def test_solution_and_covariance_are_those_of_least_squares(place, spread, noise
         covariance[0, 1] / np.prod(deviations[:2]), abs=5e-3
     )
     # combinations: what the data alone say of the parameters, whatever the places
-    J = best.jac[:count]
-    own, places = J[:, :2], J[:, 2:]
+    own, places = np.sqrt(INDEPENDENT) * J[:, :2], np.sqrt(INDEPENDENT) * J[:, 2:]
     if place:
         own = own - places @ np.linalg.lstsq(places, own, rcond=None)[0]
     assert one.singular_values == pytest.approx(np.linalg.svd(own)[1], rel=3e-3)
@@ -160,6 +174,33 @@ def test_solution_and_covariance_are_those_of_least_squares(place, spread, noise
         d, e = best.x[2 + 2 * number], 1e-4 * best.x[3 + 2 * number]
         assert abs(at.shift - d) < 0.05 * deviations[2 + 2 * number]
         assert abs(at.stretch - e) < 0.05e-4 * deviations[3 + 2 * number]
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_intervals_of_a_record_with_a_gap_are_those_of_what_is_left(stated):
+    """Without a noise that is stated they were those of the whole record, 0.7 of what they are."""
+    ready = runs(np.random.default_rng(5), 1.0)
+    present = np.abs(np.arange(N) - 0.5 * N) > 0.25 * N
+    gaps = [
+        replace(
+            one.moved(*at),
+            measured=np.where(present, one.measured, np.nan),
+            noise=one.noise if stated else np.full(2, np.nan),
+        )
+        for one, at in zip(ready, PLACES, strict=True)
+    ]
+    found = identified(gaps, [Parameter(name, (name,)) for name in TRUE], place=False)
+    rows, _ = projection(present)
+    J = []
+    for one in gaps:
+        u, v, w = (one.run.scale * rows @ waves(k, one.run.at) for k in range(3))
+        a, b = found.factors / NOISE[0], found.factors[1] / NOISE[1]
+        J += [np.stack([a[0] * u, a[1] * v], axis=1), np.stack([0.0 * w, b * w], axis=1)]
+    inverse = np.linalg.inv(sum(part.T @ part for part in J))
+    noisy = sum(part.T @ rows @ rows.T @ part for part in J)
+    exact = np.sqrt(np.diag(inverse @ noisy @ inverse))
+    assert found.deviations == pytest.approx(exact, rel=0.1)
+    assert np.mean([channel.level for channel in found.channels]) == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize("loss", ["linear", "soft_l1", "huber", "cauchy"])
@@ -216,6 +257,14 @@ def test_whiteness_is_the_statistic_of_kolmogorov_and_smirnov():
     assert statistic == pytest.approx(distance * np.sqrt(300.0))
     series = sum((-1) ** (j - 1) * np.exp(-2.0 * j**2 * statistic**2) for j in range(1, 50))
     assert chance == pytest.approx(2.0 * series, rel=1e-6)
+
+
+def test_white_residuals_are_white_beside_a_gap_too():
+    """Of a record whose half is missing 11 % were not, where 1 % are by chance."""
+    rows, share = projection(np.abs(np.arange(N) - 0.5 * N) > 0.25 * N)
+    noise = np.random.default_rng(8).normal(size=(400, N))
+    probabilities = [whiteness(rows @ row, 0.5 * share)[1] for row in noise]
+    assert np.mean(np.array(probabilities) < 0.01) <= 0.02
 
 
 def outputs_of(x):
