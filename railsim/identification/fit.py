@@ -177,7 +177,9 @@ def _solve(problem: Problem, loss: str) -> Identified:
     remarks += _suspicions(problem, x, clocks=True)
     remarks += [f"{p.run.name}: {remark}" for p in problem.runs
                 for remark in p.measurement.remarks]  # fmt: skip
-    return _outcome(problem, start, x, loss, list(dict.fromkeys(remarks)))
+    # of what is said of the start and of the end with other numbers the latter
+    said = {remark.partition(" (correlation")[0]: remark for remark in remarks}
+    return _outcome(problem, start, x, loss, list(said.values()))
 
 
 def _least_squares(

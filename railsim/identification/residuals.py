@@ -3,8 +3,8 @@
 ``history``
     The difference over time, as its Fourier coefficients in the band: for white noise they are
     independent, so that no filter colours the residuals and their number is that of the
-    independent values, but for what gaps and ends take (`Form.independent`).  Means do not count,
-    gaps are no difference; both ends fade by half a cosine.
+    independent values, but for what gaps and ends take (`Form.independent`).  Means and linear
+    drifts do not count, gaps are no difference; both ends fade by half a cosine.
 ``spectra``
     Logarithms of the rms values in third-octave bands, simulated ones with the noise that is stated
     of a channel: where the place on the track, or the track itself, is known by its spectrum only.
@@ -44,9 +44,7 @@ class Form:
         if self.kind == "sections":
             return self._sections(prepared, clean, valid)
         n = values.shape[1]
-        # without the mean, an offset of a sensor: faded and with gaps it would reach into the band
-        count = np.maximum(valid.sum(axis=1, keepdims=True), 1)
-        clean = np.where(valid, clean - clean.sum(axis=1, keepdims=True) / count, 0.0)
+        clean = _without_line(clean, valid)
         coefficients = np.fft.rfft(clean * _fade(n, prepared.step), axis=1)
         f = np.fft.rfftfreq(n, prepared.step)
         # of white noise of standard deviation 1 in the band each part has the variance 1
@@ -100,6 +98,19 @@ def _density(prepared: PreparedRun, band: tuple[float, float]) -> float:
     return float(np.sqrt(0.5 / prepared.step / (band[1] - band[0])))
 
 
+def _without_line(x: Floats, valid: Flags) -> Floats:
+    """Series that are 0 in gaps, less the straight line through their values.
+
+    Offset and drift of a sensor: faded and with gaps they would reach into the band.
+    """
+    count = np.maximum(valid.sum(axis=-1, keepdims=True), 1)
+    t = np.linspace(-1.0, 1.0, x.shape[-1])
+    t = np.where(valid, t - (valid * t).sum(axis=-1, keepdims=True) / count, 0.0)
+    square = np.maximum((t**2).sum(axis=-1, keepdims=True), 1e-300)
+    line = x.sum(axis=-1, keepdims=True) / count + (t * x).sum(axis=-1, keepdims=True) / square * t
+    return np.where(valid, x - line, 0.0)
+
+
 def _weights(prepared: PreparedRun, power: int) -> Floats:
     """Mean over time of a power of what each channel is multiplied by: the fade, 0 in gaps."""
     valid = np.isfinite(prepared.measured)
@@ -120,8 +131,7 @@ def banded(x: Floats, step: float, band: tuple[float, float]) -> Floats:
     """Return a series in a band of frequencies [Hz], both ends faded; NaN where it has no value."""
     valid = np.isfinite(x)
     n = len(x)
-    mean = np.mean(x[valid]) if valid.any() else 0.0
-    spectrum = np.fft.rfft(np.where(valid, x - mean, 0.0) * _fade(n, step))
+    spectrum = np.fft.rfft(_without_line(np.where(valid, x, 0.0), valid) * _fade(n, step))
     f = np.fft.rfftfreq(n, step)
     spectrum[(f < band[0]) | (f > band[1])] = 0.0
     return np.where(valid, np.fft.irfft(spectrum, n), np.nan)
