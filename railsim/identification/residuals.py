@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.arrays import Flags, Floats
+from railsim.arrays import Complexes, Flags, Floats
 from railsim.identification.runs import FEWEST, PreparedRun
 
 FORMS = ("history", "spectra", "sections")
@@ -129,12 +129,16 @@ def _fade(n: int, step: float) -> Floats:
 
 def banded(x: Floats, step: float, band: tuple[float, float]) -> Floats:
     """Return a series in a band of frequencies [Hz], both ends faded; NaN where it has no value."""
-    valid = np.isfinite(x)
-    n = len(x)
-    spectrum = np.fft.rfft(_without_line(np.where(valid, x, 0.0), valid) * _fade(n, step))
-    f = np.fft.rfftfreq(n, step)
+    f, spectrum = spectrum_of(x, step)
     spectrum[(f < band[0]) | (f > band[1])] = 0.0
-    return np.where(valid, np.fft.irfft(spectrum, n), np.nan)
+    return np.where(np.isfinite(x), np.fft.irfft(spectrum, len(x)), np.nan)
+
+
+def spectrum_of(x: Floats, step: float) -> tuple[Floats, Complexes]:
+    """Return frequencies [Hz] and Fourier coefficients of a series, without its line, faded."""
+    valid = np.isfinite(x)
+    faded = _without_line(np.where(valid, x, 0.0), valid) * _fade(len(x), step)
+    return np.fft.rfftfreq(len(x), step), np.fft.rfft(faded)
 
 
 def whiteness(residual: Floats, independent: float = 1.0) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from railsim.arrays import Floats
 from railsim.assessment.model_comparison import ModelValidation, Overlay
 from railsim.definitions.measurement import quantity_of
 from railsim.identification.identified import Channel, Identified
+from railsim.identification.residuals import spectrum_of
 from railsim.plot.style import DISTINCT, LIMIT, grid_of, styled, wrap
 from railsim.text import unformatted
 
@@ -146,9 +147,8 @@ def residual_spectra(identified: Identified) -> Figure:
     figure, grid = grid_of(len(channels), 3, 8.0, 1.9, 0.8, unformatted(channels[0].run))
     low, high = identified.band
     for axes, channel in zip(grid, channels, strict=True):
-        rest = channel.measured - channel.after
-        power = np.abs(np.fft.rfft(np.where(np.isfinite(rest), rest, 0.0))) ** 2
-        f = np.fft.rfftfreq(len(rest), channel.step)
+        f, coefficients = spectrum_of(channel.measured - channel.after, channel.step)
+        power = np.abs(coefficients) ** 2
         inside = (f >= low) & (f <= high)
         summed = np.cumsum(power[inside]) / max(float(power[inside].sum()), 1e-300)
         axes.plot([low, high], [0.0, 1.0], color="0.6", linewidth=0.8)

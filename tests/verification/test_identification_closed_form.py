@@ -428,6 +428,18 @@ def test_pictures_name_their_run_and_lines_differ_in_black_and_white():
     assert before.get_linestyle() != after.get_linestyle()
 
 
+def test_the_picture_of_residuals_shows_what_is_judged():
+    """A static difference in a record with a gap, which does not count, bent the line by 0.8."""
+    rest = 50.0 + np.random.default_rng(10).normal(size=2000)
+    rest[900:1100] = np.nan
+    s = np.arange(2000.0)
+    one = Channel("run", "Q1L", "Q:1:left", 0.02, s, rest, 0.0 * s, 0.0 * s, 1.0, 1.0, 0.5)
+    figure = plots.residual_spectra(SimpleNamespace(channels=(one,), band=(0.5, 20.0)))
+    _, line = figure.axes[0].lines
+    f, share = line.get_data()
+    assert np.abs(share - (f - 0.5) / 19.5).max() < 0.06
+
+
 def test_a_stretch_of_more_than_a_metre_in_a_kilometre_is_said(monkeypatch):
     monkeypatch.setitem(globals(), "PLACES", [(0.8, 1.3e-3), (-1.1, -0.9e-3)])
     found = identified(runs(np.random.default_rng(7), 0.1), [Parameter(n, (n,)) for n in TRUE])
