@@ -261,16 +261,23 @@ def comparison_tables(rows: Sequence[Comparison], results: Mapping[str, Result])
         place = "peaks" if row.where in WORDS.values() else row.where
         by_place.setdefault(place, []).append(row)
     return [
-        Table([Column("quantity", place), *_COLUMNS], _table_rows(members, results))
+        Table(
+            [Column("quantity", place), *_VALUE, *where, _DIFFERENCE],
+            _table_rows(members, results, timed=where is PLACE),
+        )
         for place, members in by_place.items()
+        for where in (PLACE if place == "peaks" else _MIDDLE,)
     ]
 
 
-_PLACE: tuple[Any, ...] = ("result", "wheelset", "side", Column("value", format=">"), *PLACE)
-_COLUMNS = (Column("words", " "), *_PLACE, Column("difference", "difference", "%", "+.2f"))
+_VALUE = (Column("words", " "), "result", "wheelset", "side", Column("value", format=">"))
+_DIFFERENCE = Column("difference", "difference", "%", "+.2f")
+_MIDDLE = [Column("distance", "middle at s", "m", ".1f")]  # of a median, which has no instant
 
 
-def _table_rows(rows: Sequence[Comparison], results: Mapping[str, Result]) -> Iterator[list[Any]]:
+def _table_rows(
+    rows: Sequence[Comparison], results: Mapping[str, Result], *, timed: bool
+) -> Iterator[list[Any]]:
     for row in rows:
         by_sign = row.where in (WORDS["max"], WORDS["min"])
         text = f"{row.quantity.words}, {row.where}" if by_sign else row.quantity.words
@@ -281,8 +288,8 @@ def _table_rows(rows: Sequence[Comparison], results: Mapping[str, Result]) -> It
             yield [
                 *(("", "") if index else (row.quantity.name, text)), label,
                 f"{results[label].wheelsets.index(name) + 1}" if name else "",
-                peak.labels.get("side", ""), Amount(peak.value, Column.of(row.quantity)), peak.time,
-                peak.distance, None if undefined else differences[label],
+                peak.labels.get("side", ""), Amount(peak.value, Column.of(row.quantity)),
+                *[peak.time] * timed, peak.distance, None if undefined else differences[label],
             ]  # fmt: skip
 
 

@@ -223,6 +223,9 @@ def test_command_prints_value_wheel_time_and_difference(files, capsys):
     assert line.endswith("-10.00")
     assert "difference (%)" in printed
     assert "full curve 1, median" in printed
+    (head,) = [line for line in printed.splitlines() if line.startswith("full curve 1, median")]
+    assert "t (s)" not in head  # a median has no instant
+    assert "middle at s (m)" in head
 
 
 def test_remarks_are_printed_unless_quiet(files, capsys, monkeypatch):
