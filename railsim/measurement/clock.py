@@ -58,8 +58,9 @@ def clock_of(file: str, times: Floats) -> Clock:
     wrong = np.flatnonzero(~(steps > 0.0))
     if not np.isfinite(times).all() or len(wrong):
         row = int(wrong[0]) + 2 if len(wrong) else 1
-        found = f"time {times[row - 1]:g} s of value {row} does not rise"
-        raise input_error(file, found, "times that rise from value to value", key="time")
+        found = f"time {times[row - 1]:.10g} s of value {row} does not rise"
+        allowed = "times that rise from value to value; of too few digits: 'rate' in place of them"
+        raise input_error(file, found, allowed, key="time")
     count = np.arange(len(times))
     slope, first = np.polyfit(count - count.mean(), times - times.mean(), 1)
     line = times.mean() + first + slope * (count - count.mean())
