@@ -335,7 +335,7 @@ def test_a_step_of_one_and_a_half_is_a_gap(extra, gap):
 
 def test_a_clock_of_too_few_digits_is_refused_with_the_way_out():
     """Of 200 values per second written with two digits every second stands still."""
-    with pytest.raises(InputError, match="time 86400.01 s of value 3 .*'rate' in place of them"):
+    with pytest.raises(InputError, match=r"time 86400\.01 s of value 3 .*'rate' in place of them"):
         clock_of("made", np.round(86400.0 + 0.005 * np.arange(100) + 1e-5, 2))
 
 
