@@ -31,10 +31,10 @@ CAPTIONS = {
     "scatter": "Simulated over measured section values; dashed the limit of the mean, dotted twice "
     "that of the standard deviation.",
     "differences": "Differences over the limit of their standard deviation; line: their mean.",
-    "overlays": "Channels over the arc length, low-passed at 20 Hz.",
+    "overlays": "Channels over 400 m in the middle of the run, low-passed at 20 Hz.",
     "spectra": "Power spectral densities.",
-    "fits": "Measured, with the values of the file, and with the identified ones; means are drawn "
-    "but not compared.",
+    "fits": "Measured, with the values of the file, and with the identified ones, 4 s of the run; "
+    "means and linear drifts are drawn but not compared.",
     "wear": "Profiles, new and worn, with the depth of wear.",
     "residuals": "Cumulative periodograms of the residuals: a straight line where they are white.",
 }
