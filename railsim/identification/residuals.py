@@ -138,7 +138,7 @@ def spectrum_of(x: Floats, step: float) -> tuple[Floats, Complexes]:
     """Return frequencies [Hz] and Fourier coefficients of a series, without its line, faded."""
     valid = np.isfinite(x)
     faded = _without_line(np.where(valid, x, 0.0), valid) * _fade(len(x), step)
-    return np.fft.rfftfreq(len(x), step), np.fft.rfft(faded)
+    return np.asarray(np.fft.rfftfreq(len(x), step)), np.fft.rfft(faded)
 
 
 def whiteness(residual: Floats, independent: float = 1.0) -> tuple[float, float]:
