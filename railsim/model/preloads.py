@@ -123,7 +123,7 @@ def static_shares(model: Model, *, solved: bool = False) -> dict[str, float]:
     their preloads were to be found; a given preload counts as it is.  Positive where the spring
     pushes its bodies apart.  With `solved` the model's preloads are taken as they are.
 
-    Raises ModelError: the springs cannot carry the vehicle.
+    Raises ModelError: the springs cannot carry the vehicle, or wedges would have to pull.
     """
     support = _auto_preloads(model, known_lengths=True)
     filled = model
@@ -134,6 +134,7 @@ def static_shares(model: Model, *, solved: bool = False) -> dict[str, float]:
                 "the springs cannot carry the vehicle in its nominal position; unbalanced: "
                 + "; ".join(unbalanced)
             )
+        _with_pressing_wedges(filled)
     flat = {element.name: element for element in model.flat.elements}
     names, forces = _names(model), _forces(filled.system)
     shares = {}

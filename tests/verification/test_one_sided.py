@@ -129,6 +129,9 @@ def test_wedge_the_wrong_way_round_is_refused_by_name():
         ModelError, match=rf"'{wrong.name}'.* would have to pull.*front\.wedge\.right"
     ):
         railsim.static_loads(wrong)
+    # `validate` says it too, with the remarks on the file
+    assert any("wedges press and never pull" in note.text for note in vehicle_remarks(wrong))
+    assert not vehicle_remarks(right)
 
 
 def test_pad_that_does_not_touch_takes_no_part_in_the_modes():
