@@ -180,7 +180,9 @@ def without_rails(vehicle: Vehicle) -> Model:
     """Return the model of a vehicle without wheels' contacts and track, for statics alone."""
     flat = flatten(vehicle)
     system, index = _suspension(flat)
-    return Model(system, index, flat, (), {})
+    loaded = vehicle.load is not None
+    design = without_rails(vehicle.model_copy(update={"load": None})) if loaded else None
+    return Model(system, index, flat, (), {}, design)
 
 
 def _suspension(flat: FlatVehicle, laws: Mapping[str, Law] | None = None) -> tuple[System, Index]:

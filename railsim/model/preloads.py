@@ -119,16 +119,17 @@ def _with_pressing_wedges(model: Model) -> Model:
 def static_shares(model: Model, *, solved: bool = False) -> dict[str, float]:
     """Compression of all springs that carry weight at rest in the nominal position, by name [N].
 
-    As `with_preloads`, of a load case with its own weights, and of springs with known lengths as if
-    their preloads were to be found; a given preload counts as it is.  Positive where the spring
-    pushes its bodies apart.  With `solved` the model's preloads are taken as they are.
+    As `with_preloads`, of a load case with its own weights (what given preloads leave of them moves
+    the bodies), and of springs with known lengths as if their preloads were to be found; a given
+    preload counts as it is.  Positive where the spring pushes its bodies apart.  With `solved` the
+    model's preloads are taken as they are.
 
     Raises ModelError: the springs cannot carry the vehicle, or wedges would have to pull.
     """
     support = _auto_preloads(model, known_lengths=True)
     filled = model
     if not solved:
-        filled, unbalanced = _balance(model, support)
+        filled, unbalanced = _balance(model, support, given=model.design is not None)
         if unbalanced and not len(model.system.bodies.fixed):
             raise ModelError(
                 "the springs cannot carry the vehicle in its nominal position; unbalanced: "

@@ -276,6 +276,11 @@ def test_a_remark_begins_at_its_limit(made, words, usual, unusual):
     assert [r.text for r in vehicle_remarks(made(unusual)) if words in r.text]
 
 
+def test_a_load_off_the_middle_leans_on_side_bearers_of_given_preload():
+    """It does not stand in the nominal position, which it need not: the carbody finds its roll."""
+    assert not vehicle_remarks(load_vehicle("wagon_y25", ["load=uneven"]))
+
+
 def test_springs_below_a_held_body_carry_it():
     """A frame of 1 t on soft springs from a held car of 8 t: they press with 39.2 kN each."""
     found = vehicle(
