@@ -167,6 +167,32 @@ def test_uneven_load_gives_the_wheel_loads_of_its_moment():
 
 
 @pytest.mark.usefixtures("small_contact_tables")
+def test_y25_bogie_turns_in_a_curve_against_the_friction_of_bowl_and_side_bearers():
+    """On its way into R 250 m: mu N 2/3 R of the bowl and mu N 0.85 m of two side bearers."""
+    plan = [
+        {"type": "STR", "length": 10.0},
+        {"type": "CLO", "length": 15.0},
+        {"type": "CIR", "length": 30.0, "radius": 250.0},
+    ]
+    names = ["front.centre_bowl*", "front.side_bearer.*"]
+    result = railsim.simulate(
+        load_vehicle("wagon_y25"),
+        load_track("straight").replace(plan=plan),
+        speed=8.0,
+        until=24.0,
+        settings=Settings().with_values({"outputs": {"elements": names}}),
+    )
+
+    def at_the_end(element, axis):
+        return result.series("element_force", element=f"front.{element}", component=axis)[-1]
+
+    moment = 0.127 * (at_the_end("centre_bowl_ahead", "y") - at_the_end("centre_bowl_behind", "y"))
+    moment += 0.85 * (at_the_end("side_bearer.left", "x") - at_the_end("side_bearer.right", "x"))
+    bearers = 2.0 * 16e3
+    bowl = 12.2e3 * GRAVITY / 2.0 - bearers
+    assert -moment == pytest.approx(0.3 * (0.127 * bowl + 0.85 * bearers), rel=0.01)
+
+
 def test_c62a_stands_higher_when_empty_by_its_bolster_springs():
     empty, _, _ = standing("wagon_c62a_empty")
     laden, _, _ = standing("wagon_c62a")
