@@ -190,6 +190,7 @@ SIGNS = {
     "frictional_power": "turned into heat in the contact, with spin and the flange back on "
     "check rails",
     "axle_torque": "forwards positive",
+    "running_speed": "along the track",
     "patch_pressure": "Hertz: 3 N / (2 pi a b)",
     "patch_angle": "positive where the normal into the rail leans to the right",
     "patch_x": "from the wheelset's centre, forwards",
@@ -267,7 +268,8 @@ REQUESTED = {
                  frictional_power)),
         *_on_request("drives",
             _row("axle_torque", "torque of drives, brakes and actuators on the wheelset", "M_d",
-                 "kN m", _AXLE)),
+                 "kN m", _AXLE),
+            _row("running_speed", "speed of the reference body", "V", "km/h", _RUN)),
         *_on_request("contact_patches",
             _row("patch_N", "normal force of the patch", "N", "kN", _PATCH),
             _row("patch_pressure", "largest pressure of the patch", "p_{max}", "MPa", _PATCH),

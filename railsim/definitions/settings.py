@@ -134,7 +134,7 @@ class Outputs(base.Definition):
     frictional_power: base.Flag = False
     """Power that each wheel's contact turns into heat"""
     drives: base.Flag = False
-    """Torque of drives, brakes and actuators on each wheelset"""
+    """Torque of drives, brakes and actuators on each wheelset, and the speed along the track"""
     track: base.Flag = False
     """Curvature, cant, gradient and irregularities at each wheelset"""
     own: dict[base.Name, OwnOutput] | None = None

@@ -254,6 +254,7 @@ class OutputPlan:
             values |= _patches(recorder.patch[:rows], recorder.state[:rows, -1])
         if self._outputs.drives:
             values["axle_torque"] = self._axle_torques(recorder, rows)
+            values["running_speed"] = recorder.state[:rows, -1]
         if self._outputs.track:
             values |= self._track(values["wheelset_distance"])
             deflection = recorder.rail[:rows]

@@ -130,6 +130,8 @@ def test_free_running_accelerates_the_mass_and_the_rotating_wheels():
         result = run(bogie(traction(kind=kind)), duration=3.0, drive={"mode": "free"})
         time, way = result["time"], result["distance"]
         speed = np.gradient(way, time)
+        travelled = np.trapezoid(result["running_speed"], time)
+        assert travelled == pytest.approx(way[-1] - way[0], rel=1e-6)
         rate = np.polyfit(time[200:-2], speed[200:-2], 1)[0]
         assert rate == pytest.approx(sign * expected, rel=2e-3)
 
