@@ -150,6 +150,8 @@ def check_agreement(
             if not any(fnmatchcase(name, pattern) for name in names):
                 key = "outputs.elements" if where else "outputs.quantities"
                 found = f"no {word} is called '{pattern}'{where}"
+                if where and any(fnmatchcase(e.name, pattern) for e in flat.elements):
+                    found = f"'{pattern}'{where} has no deflection; torques: outputs.drives"
                 faults.append(Fault("settings", key, found, nearest(pattern, names)))
     interval = with_loop_rate(settings).output_interval(speed)
     if settings.step is not None and settings.drive.mode == "constant":

@@ -230,6 +230,16 @@ def test_wrong_measured_track_is_told(tmp_path, capsys, monkeypatch, csv, words)
             "outputs.elements: no element is called 'nothing*'",
         ),
         (
+            [
+                "--set",
+                "settings.outputs.elements=['wind']",
+                "--set",
+                'vehicle.elements.wind={kind="applied_force", bodies=["carbody"], '
+                "force_table=[[0,0,1e3,0]]}",
+            ],
+            "outputs.elements: 'wind' in vehicle 'coach_manchester' has no deflection; torques:",
+        ),
+        (
             ["--set", "settings.initial.carbdy.y=0.1"],
             "no such body in vehicle 'coach_manchester'; did you mean",
         ),
