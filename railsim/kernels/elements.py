@@ -259,9 +259,9 @@ def pad_load(mounts, curves, e, z):
         return 0.0
     preload = mounts.row[e, PRELOAD_Z]
     force = preload + mounts.row[e, STIFFNESS_Z] * z
+    if mounts.curve[e, 2] >= 0:
+        force += curve_value(curves, mounts.curve[e, 2], z)
     if mounts.flags[e, FRICTION] == ONE_SIDED:
-        if mounts.curve[e, 2] >= 0:
-            force += curve_value(curves, mounts.curve[e, 2], z)
         return max(0.0, force)
     if preload == 0.0:
         return abs(force)

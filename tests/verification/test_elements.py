@@ -252,6 +252,23 @@ def test_a_leaf_spring_grips_only_in_the_direction_of_its_preload(preload):
     assert np.all(pulled(rig, np.eye(6)[0], held=gone)[:, :2] == 0.0)
 
 
+@pytest.mark.parametrize(("z", "N"), [(0.0, 3e4), (-0.006, 3.6e4), (-0.04, 7e4 + 5.44e4)])
+def test_both_stages_of_a_spring_press_on_its_friction(z, N):
+    """N by hand: preload, first stage 1 MN/m, second stage 1.6 MN/m after 6 mm of compression."""
+    rig = Rig(
+        kind="friction",
+        friction_coefficient=[0.3, 0.2, 0.0],
+        stick_stiffness=[2e7, 2e7, 0.0],
+        stiffness=[0.0, 0.0, 1e6],
+        stage_table=[[-0.106, -160e3], [-0.006, 0.0], [0.5, 0.0]],
+        preload=[0.0, 0.0, -3e4],
+    )
+    held = np.array([0.0, 0.0, z, 0.0, 0.0, 0.0])
+    along_x, along_y = (pulled(rig, np.eye(6)[k], held=held)[-1] for k in (0, 1))
+    assert (along_x[0], along_y[1]) == pytest.approx((0.3 * N, 0.2 * N))
+    assert along_x[2] == pytest.approx(-N)
+
+
 def test_side_bearer_with_clearance_and_stop():
     """Nothing in the clearance, then its spring, then the stop beside it."""
     rig = Rig(**pressed(0.0, clearance=0.004, stop_travel=0.01, stop_stiffness=5e7))

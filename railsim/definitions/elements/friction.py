@@ -7,6 +7,7 @@ from pydantic import Field
 
 from railsim.definitions import base
 from railsim.definitions.elements.base import (
+    Characteristic,
     Compression,
     Element,
     PairElement,
@@ -42,9 +43,9 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
     """Dry friction along the axes of body 1, with a spring in parallel: leaf spring, friction pad.
 
     The largest friction force along an axis is friction_force + friction_coefficient N, with N the
-    vertical spring force of this element in the direction of its preload, 0 where it is gone.  The
-    friction forces along all axes are one vector within the ellipse of these limits, or each has a
-    limit of its own; below it the pad sticks elastically.
+    vertical spring force of this element, both stages, in the direction of its preload, 0 where it
+    is gone.  The friction forces along all axes are one vector within the ellipse of these limits,
+    or each has a limit of its own; below it the pad sticks elastically.
     """
 
     SUPPORTS: ClassVar = "on axles"
@@ -60,6 +61,8 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
     the limits differ); `axes`: contacts of their own along each axis"""
     stiffness: base.NonNegativeVector = NOTHING
     """Stiffness of the parallel spring along x, y, z [N/m]"""
+    stage_table: Characteristic | None = None
+    """Second stage of the spring along z: rows [travel of body 2 m, further force N]"""
     damping: base.NonNegativeVector = NOTHING
     """Damping along x, y, z [N s/m]"""
     preload: base.AutoOrVector = "auto"
@@ -78,6 +81,11 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
         if any(self.friction_coefficient) and not pressed:
             raise ValueError("'friction_coefficient' needs 'stiffness' or 'preload' along z")
 
+    @property
+    def stop_table(self) -> Rows | None:
+        """Force of the second stage over the travel of body 2."""
+        return self.stage_table
+
     def rows(self) -> list[Mount]:
         """One mount with pads along the axes that have friction."""
         pairs = zip(self.friction_force, self.friction_coefficient, strict=True)
@@ -85,7 +93,9 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
         together = self.friction_limit == "circle"
         return [
             self.mount(
-                friction=(x, y, z), states=pads(self.stick_stiffness, (x, y, z), together=together)
+                friction=(x, y, z),
+                states=pads(self.stick_stiffness, (x, y, z), together=together),
+                tables=(None, None, self.stage_table),
             )
         ]
 
