@@ -79,11 +79,15 @@ class Quantity:
         return self.long_name if self.shown_unit == "-" else f"{self.long_name} ({self.shown_unit})"
 
     @property
+    def title(self) -> str:
+        """Long name as a title."""
+        return self.long_name[:1].upper() + self.long_name[1:]
+
+    @property
     def label(self) -> str:
         """Axis label: words, symbol and shown unit."""
-        words = self.long_name[:1].upper() + self.long_name[1:]
         unit = "" if self.shown_unit == "-" else f" ({self.shown_unit})"
-        return f"{words} ${self.symbol}${unit}"
+        return f"{self.title} ${self.symbol}${unit}"
 
     def component(self, name: str) -> "Quantity":
         """Return this quantity for one of `COMPONENTS`, with that component's unit.

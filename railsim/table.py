@@ -206,9 +206,12 @@ class Table:
             justify: Any = "right" if column.format else "left"
             folded = Text(_fold(heading, least))
             grid.add_column(folded, justify=justify, overflow="fold", width=least)
+        colours = dict.fromkeys(GOOD, "green") | dict.fromkeys(BAD, "red")
         for row in cells[1:]:
             parts = zip(row, widths, strict=True)
-            grid.add_row(*(Text(_fold(cell, least), _style(cell)) for cell, least in parts))
+            grid.add_row(
+                *(Text(_fold(cell, least), colours.get(cell, "")) for cell, least in parts)
+            )
         stream = io.StringIO()
         console = Console(
             file=stream, width=max(width, sum(widths) + gap * len(widths)), force_terminal=colour,
@@ -321,10 +324,6 @@ def _fold(text: str, width: int) -> str:
         else:
             lines[-1] += part
     return "\n".join(lines)
-
-
-def _style(cell: str) -> str:
-    return "green" if cell in GOOD else "red" if cell in BAD else ""
 
 
 def _plain(cell: Any) -> Any:

@@ -16,6 +16,7 @@ from railsim.animation.scene import DrawnBody, Scene
 from railsim.arrays import Floats
 from railsim.errors import argument_error
 from railsim.files.access import check_file, whole_file
+from railsim.result.sensors import out_of_body, turned
 
 AZIMUTH, ELEVATION = -0.75, 0.3  # rad, of the view
 MARGIN = 1.5  # m, about the vehicle: modes move by 5 % of its length
@@ -110,10 +111,10 @@ def _polygons(scene: Scene, frame: int, gain: float) -> Iterator[tuple[float, Fl
         roll, pitch, yaw = gain * q[3:]
         pitch = 0.0 if body.kind == "wheelset" else pitch  # its rims are round
         for points in _shape(body):
-            turned = _turned(points, roll, pitch, yaw) + np.array(
+            moved = out_of_body(points, roll, pitch, yaw) + np.array(
                 [(gain - 1.0) * q[0], body.y + gain * q[1], body.z + gain * q[2]]
             )
-            corners, depth = _on_screen(_in_space(frame_at, turned), pose)
+            corners, depth = _on_screen(_in_space(frame_at, moved), pose)
             yield depth, corners, face, edge
 
 
@@ -134,33 +135,19 @@ def _track(scene: Scene, s: float) -> Floats:
     return np.array([np.interp(s, track["s"], track[n]) for n in ("x", "y", "heading", "cant")])
 
 
-def _rotated(a: Floats, b: Floats, angle: float) -> tuple[Floats, Floats]:
-    """Coordinates in a plane after a turn from the first axis to the second."""
-    return np.cos(angle) * a - np.sin(angle) * b, np.sin(angle) * a + np.cos(angle) * b
-
-
 def _in_space(pose: Floats, points: Floats) -> Floats:
     """Points of the track frame in space."""
     x, y, heading, cant = pose
-    across, down = _rotated(points[:, 1], points[:, 2], cant)
-    east, south = _rotated(points[:, 0], across, heading)
+    across, down = turned(points[:, 1], points[:, 2], cant)
+    east, south = turned(points[:, 0], across, heading)
     return np.column_stack([x + east, y + south, down])
-
-
-def _turned(points: Floats, roll: float, pitch: float, yaw: float) -> Floats:
-    """Rz(yaw) Rx(roll) Ry(pitch)."""
-    x, y, z = points.T
-    z, x = _rotated(z, x, pitch)
-    y, z = _rotated(y, z, roll)
-    x, y = _rotated(x, y, yaw)
-    return np.column_stack([x, y, z])
 
 
 def _on_screen(points: Floats, pose: Floats) -> tuple[Floats, float]:
     """Points on the screen, right and down [m], and their mean depth."""
     x, y, z = points.T
-    forward, right = _rotated(x - pose[0], y - pose[1], -(pose[2] + AZIMUTH))
-    down, depth = _rotated(z + 1.4, forward, ELEVATION)
+    forward, right = turned(x - pose[0], y - pose[1], -(pose[2] + AZIMUTH))
+    down, depth = turned(z + 1.4, forward, ELEVATION)
     return np.column_stack([right, down]), float(np.mean(depth))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from railsim.animation.scene import Scene
-from railsim.files.access import check_file, whole_file
+from railsim.files.access import check_file, write_text
 from railsim.notation import QUANTITIES
 from railsim.page import render_page
 
@@ -30,8 +30,7 @@ def write_page(
         scripts=["page.js"], data=scene_data(scene) | {"modes": [_motion(mode) for mode in modes]},
         schemes="light dark",
     )  # fmt: skip
-    with whole_file(path) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(path, text)
     return path
 
 

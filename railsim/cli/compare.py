@@ -63,16 +63,9 @@ def _compare_group(
     title: str, results: "Group", over: str, output: cli.Output
 ) -> tuple[dict[str, Any], list[Any]]:
     """Write what is compared with each other; return its record and the parts that are printed."""
-    from railsim.compare import (
-        compare,
-        comparison_table,
-        comparison_tables,
-        condition_table,
-        conditions,
-        difference_table,
-    )
+    from railsim import compare
 
-    rows, unlike = compare(results), conditions(results)
+    rows, unlike = compare.compare(results), compare.conditions(results)
     differing, why = _differing(results)
     record = {
         "results": list(results),
@@ -88,13 +81,13 @@ def _compare_group(
         from railsim.plot.overlay import difference_figure, overlay
 
         table, data, picture, differences = (_file_name(name, title) for name in FILES)
-        output.write(table, comparison_table(rows))
+        output.write(table, compare.comparison_table(rows))
         output.write(data, record)
         output.write(picture, overlay(results, over=over))
         if differing:
             output.write(differences, difference_figure(differing, next(iter(results))))
-    parts: list[Any] = [condition_table(unlike, results), ""] if unlike else []
-    for one in comparison_tables(rows, results):
+    parts: list[Any] = [compare.condition_table(unlike, results), ""] if unlike else []
+    for one in compare.comparison_tables(rows, results):
         parts += [one, ""]
     for label, result in results.items():
         if result.status != "complete":
@@ -102,7 +95,7 @@ def _compare_group(
             parts.append(f"{label}: {ended}; compared up to s = {result['distance'][-1]:.1f} m")
     for label, result in () if output.quiet else results.items():
         parts += [f"{label}: remark: {remark}" for remark in result.remarks]
-    return record, parts + ([difference_table(differing)] if differing else why)
+    return record, parts + ([compare.difference_table(differing)] if differing else why)
 
 
 def _file_name(name: str, title: str) -> str:

@@ -66,12 +66,12 @@ def command(
     how |= {"band": (low, high), "place": not fixed_place, "folder": folder and folder / KEPT}
     found = identify(vehicle, measured, keys, progress=progress, **how)
     if folder:
+        from railsim.plot import validation as plots
         from railsim.report import measured as report
 
-        figures = report.identification_figures(found)
+        figures = {"fits": plots.fits(found), "residuals": plots.residual_spectra(found)}
         part = report.identification_part(found.record(), report.as_drawings(figures))
-        pictures = figures["fits"], figures["residuals"]
-        content = found.record(), report.measured_page([part]), *pictures
+        content = found.record(), report.measured_page([part]), *figures.values()
         output.write_all(dict(zip(FILES[1:], content, strict=True)))
         output.written.append(found.save_vehicle(folder / FILES[0], vehicle, overwrite=True))
         shutil.rmtree(folder / KEPT, ignore_errors=True)

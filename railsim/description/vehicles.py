@@ -11,6 +11,7 @@ from railsim.definitions.vehicle.tables import Assembly
 from railsim.description.values import Description, Parts, either, short
 from railsim.table import Column, Table
 
+PLURALS = {"body": "bodies", "axlebox": "axleboxes"}
 _BODY = ("name", "kind", "fixed", "mass", "inertia", "position", "pitch_inertia")
 
 
@@ -38,7 +39,9 @@ def describe_vehicle(vehicle: Vehicle) -> Description:
     data |= {"service": service and service.model_dump(), "load": vehicle.load, "loads": loads}
     data |= {"bodies": bodies, "elements": elements}
     kinds = Counter(body.kind for body in flat.bodies)
-    counts = ", ".join(f"{n} {_kind_word(kind, n)}" for kind, n in kinds.items())
+    counts = ", ".join(
+        f"{n} {PLURALS.get(kind, f'{kind}s') if n > 1 else kind}" for kind, n in kinds.items()
+    )
     parts: Parts = [
         vehicle.name,
         f"  {counts}, {len(elements)} elements; mass {flat.mass / 1e3:.3f} t; mean wheel load "
@@ -73,11 +76,6 @@ def _body_table(bodies: Iterable[dict[str, Any]]) -> Table:
         kind = f"{body['kind']}, fixed" if body["fixed"] else body["kind"]
         rows.append([body["name"], kind, wheels, body["mass"], *inertia, *body["position"]])
     return Table([*columns, *inertias, *positions], rows)
-
-
-def _kind_word(kind: str, number: int) -> str:
-    words = {"body": ("body", "bodies"), "axlebox": ("axlebox", "axleboxes")}
-    return words.get(kind, (kind, f"{kind}s"))[number > 1]
 
 
 def _element_rows(

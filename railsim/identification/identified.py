@@ -13,7 +13,7 @@ import tomli_w
 from railsim.arrays import Floats
 from railsim.definitions.base import FrozenDict
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.files.access import check_file, relative, whole_file
+from railsim.files.access import check_file, relative, write_text
 from railsim.identification.parameters import TRACK, Parameter, blended, find_value, scaled
 from railsim.identification.residuals import banded
 from railsim.profiles import save_profile
@@ -264,8 +264,7 @@ class Identified:
                 file = path.with_name(f"{path.stem}_wheel{len(files) + 1}.csv")
                 save_profile(blended(first, second, float(x)), file)
                 files[first] = file.name, f"[I] {x:.3g} +- {spread:.2g} of the way to {second}"
-        with whole_file(path) as partial:
-            partial.write_text(self._file(path, base, files), encoding="utf-8")
+        write_text(path, self._file(path, base, files))
         return path
 
     def _file(

@@ -21,15 +21,8 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, ModelError, argument_error, input_error
 from railsim.identification.parameters import Model, Parameter
-from railsim.measurement import Measurement
-from railsim.measurement.counterpart import (
-    amplified,
-    check_channels,
-    counterparts,
-    outputs_for,
-    rests,
-    series,
-)
+from railsim.measurement import Measurement, counterpart
+from railsim.measurement.counterpart import counterparts
 from railsim.result import Result
 from railsim.simulation import simulate
 from railsim.simulation.remarks import silent
@@ -96,7 +89,7 @@ class Run:
         count = len(self.selections)
         values = np.empty((2 * count if slope else count, len(self.at)))
         for k, (name, channel) in enumerate(zip(self.selections, self.amplifiers, strict=True)):
-            at_sensor = amplified(series(result, name), rate, channel)
+            at_sensor = counterpart.amplified(counterpart.series(result, name), rate, channel)
             spline = make_interp_spline(distance[rows], at_sensor[rows], DEGREE)
             values[k] = spline(self.at)
             if slope:
@@ -189,7 +182,7 @@ def prepare_run(
     above what was sampled, a run too short or beyond the track.
     """
     track = track or track_of(measurement)
-    check_channels(measurement.name, measurement, model.vehicle)
+    counterpart.check_channels(measurement.name, measurement, model.vehicle)
     measurement = _without_standstill(measurement)
     high = band[1]
     if measurement.rate < 2.5 * high:
@@ -214,7 +207,7 @@ def prepare_run(
         found = f"{band[0]:g} to {high:g} Hz: {number} frequencies, {f[1]:.3g} Hz apart"
         allowed = f"{FEWEST} at least: a wider band or a longer run"
         raise input_error(measurement.name, found, allowed, key="band")
-    outputs = outputs_for(counterparts(measurement).values())
+    outputs = counterpart.outputs_for(counterparts(measurement).values())
     constant = _constant_channels(thinner)
     dead = "does not change where runs are compared: a dead sensor? It is left out."
     measurement = measurement.with_remarks(*(f"{name} {dead}" for name in constant))
@@ -244,7 +237,7 @@ def prepare_run(
 def _constant_channels(measurement: Measurement) -> list[str]:
     """Return the channels without a change; raises InputError: there is no other channel."""
     channels = {name: measurement[name] for name in counterparts(measurement)}
-    constant = [name for name, x in channels.items() if rests(x)]
+    constant = [name for name, x in channels.items() if counterpart.rests(x)]
     if len(constant) == len(channels):
         found = "no value where runs are compared"
         if any(np.isfinite(x).any() for x in channels.values()):
@@ -286,6 +279,6 @@ def simulated_run(measurement: Measurement, vehicle: Vehicle | str | Path | None
     ModelError: as `simulate`; channels that the vehicle does not have.
     """
     model = model_of(vehicle, [measurement])
-    check_channels(measurement.name, measurement, model.vehicle)
+    counterpart.check_channels(measurement.name, measurement, model.vehicle)
     run = prepare_run(measurement, model, (0.1, min(ALIKE, 0.4 * measurement.rate))).run
     return run.result(run.model(model))

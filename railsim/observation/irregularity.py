@@ -32,16 +32,9 @@ from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
 from railsim.measurement.alignment import CURVATURES
 from railsim.measurement.counterpart import amplifier
-from railsim.observation import innovations
+from railsim.observation import estimate, innovations
 from railsim.observation.contact import Noise, with_mean_contact
-from railsim.observation.estimate import (
-    Estimate,
-    Irregularity,
-    estimate_of,
-    join_pieces,
-    lengths_without_values,
-    rms,
-)
+from railsim.observation.estimate import Estimate, Irregularity, join_pieces, rms
 from railsim.observation.innovations import KINDS, Powers, Sizes, likely_sizes, spectra_of
 from railsim.observation.pieces import MARGIN, READ, STEP, Piece, pieces_of, used_channels
 from railsim.observation.simulated import CHANGE, SimulatedRun, refine
@@ -139,7 +132,7 @@ def irregularity(
         remarks.append(f"Not used: {', '.join(unused)}; the smoother reads accelerations.")
     remarks += _other_curves(track, measurement, used)
     pieces = pieces_of(measurement, list(used))
-    remarks += lengths_without_values(pieces)
+    remarks += estimate.lengths_without_values(pieces)
     begin, end = measurement.distance[[0, -1]].tolist()
     if not is_uniform(track) and (begin < -MARGIN or end > track.length + MARGIN):
         found, allowed = f"{begin:.0f} to {end:.0f} m", f"0 to {track.length:.0f} m"
@@ -295,7 +288,7 @@ class _Smooth:
         if self.simulations:
             outcome = self._refine(piece, run, powers, sizes, whole[:, forces], mean, valid)
             covariance, mean, base = outcome or (covariance, mean, base)
-        return estimate_of(
+        return estimate.estimate_of(
             piece, np.fft.rfft(mean, axis=1), covariance, powers.track,
             (names, whole[:, forces], base),
         )  # fmt: skip

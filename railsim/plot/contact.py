@@ -17,17 +17,8 @@ from railsim.contact.elastic import LoadedContact
 from railsim.contact.exact_normal import ExactContact
 from railsim.contact.geometry import ContactGeometry
 from railsim.contact.summary import Pair
-from railsim.plot.style import (
-    ABOVE,
-    DISTINCT,
-    SIDE_LINES,
-    Picture,
-    key,
-    label_grid,
-    note,
-    single,
-    styled,
-)
+from railsim.plot import style
+from railsim.plot.style import DISTINCT, Picture, note, styled
 from railsim.profiles.profile import Profile
 from railsim.text import unformatted
 
@@ -124,7 +115,7 @@ def functions_figure(geometry: ContactGeometry, title: str = "") -> Figure:
         (axes[1, 1], 1e3 * np.abs(geometry.contact_y), "distance from track centre (mm)"),
     ):
         for own, name in zip(values.T, SIDES, strict=True):
-            panel.plot(y, own, color=SIDE_COLOURS[name], ls=SIDE_LINES[name], label=name)
+            panel.plot(y, own, color=SIDE_COLOURS[name], ls=style.SIDE_LINES[name], label=name)
         panel.set_ylabel(label)
     axes[0, 1].legend(loc="upper center")
     axes[0, 0].set_ylabel("rolling radius difference $\\Delta r$ (mm)")
@@ -156,11 +147,11 @@ def _limit(axes: Axes, values: Floats, geometry: ContactGeometry) -> None:
 @styled()
 def conicity_figure(conicity: Mapping[str, tuple[Floats, Floats]]) -> Figure:
     """Equivalent conicity over the amplitude: amplitudes [m] and values [1] by their name."""
-    figure, axes = single(5.6, 3.6, edges=(0.11, 0.13, 0.985, 0.975))
+    figure, axes = style.single(5.6, 3.6, edges=(0.11, 0.13, 0.985, 0.975))
     for colour, (name, (amplitudes, values)) in zip(DISTINCT, conicity.items(), strict=False):
         axes.plot(1e3 * amplitudes, values, color=colour, marker=".", ms=4, label=unformatted(name))
     axes.axvline(3.0, color="0.75", lw=0.6, zorder=0)
-    note(axes, "3 mm", (3.0, 1.0), (3, -2), "left", "top", frame=ABOVE)
+    note(axes, "3 mm", (3.0, 1.0), (3, -2), "left", "top", frame=style.ABOVE)
     axes.set(xlabel="amplitude $\\hat y$ (mm)", ylabel="equivalent conicity $\\tan\\gamma_e$")
     axes.set_xlim(left=0.0)
     axes.set_ylim(bottom=0.0)
@@ -173,7 +164,7 @@ def conicity_map_figure(
     gauges: Sequence[float], amplitudes: Floats, values: Floats, title: str = ""
 ) -> Figure:
     """Equivalent conicity, float64[gauge, amplitude], over gauge and amplitude [m]."""
-    figure, axes = single(5.6, 3.6, title, (0.11, 0.13, 0.985, 0.9 if title else 0.975))
+    figure, axes = style.single(5.6, 3.6, title, (0.11, 0.13, 0.985, 0.9 if title else 0.975))
     # the flange's slopes beyond would hide the tread's
     levels = np.linspace(0.0, 0.8, 17)
     x, y = 1e3 * np.asarray(gauges), 1e3 * amplitudes
@@ -229,9 +220,9 @@ def patches_figure(
     figure = Picture(9.6, height, edges=edges)
     title = f"Contact patches of the right wheel under {1e-3 * load:.0f} kN{where}"
     figure.suptitle(title, x=0.06, y=1.0 - 0.1 / height, ha="left", va="top")
-    handles = [key(zone, color=colour) for zone, colour in ZONE_COLOURS.items()]
+    handles = [style.key(zone, color=colour) for zone, colour in ZONE_COLOURS.items()]
     tables = zip(labels[: 2 if other else 1], TABLE_LINES, strict=False)
-    handles += [key(label, color="0.3", ls=line) for label, line in tables]
+    handles += [style.key(label, color="0.3", ls=line) for label, line in tables]
     at = (0.05, 1.0 - 0.3 / height)
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=at, ncols=len(handles))
     axes = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
@@ -250,7 +241,7 @@ def patches_figure(
             _draw_ellipses(panel, other[y], TABLE_LINES[1])
         panel.set(title=f"$y$ = {1e3 * y:g} mm".replace("-", "−"), xlim=(low, high))
         panel.set(ylim=(-22.0, 22.0), aspect="equal")
-    label_grid(axes, len(contacts), columns, ("lateral position (mm)", "along the rail (mm)"))
+    style.label_grid(axes, len(contacts), columns, ("lateral position (mm)", "along the rail (mm)"))
     if image is not None:
         bar = figure.add_axes((0.92, 0.2, 0.012, 0.6))
         figure.colorbar(image, cax=bar, label="pressure by boundary elements (MPa)")

@@ -142,7 +142,7 @@ def _draw(
         # the leading wheelset stays visible
         look = {"ls": style.SIDE_LINES[side], "zorder": above, "markevery": marked, **look}
         axes.plot(horizontal, values, ms=3.5, **look)
-    heading = capitalised(quantity)
+    heading = quantity.title
     drawn = {line.labels["wheelset"] for line in panel.lines if "wheelset" in line.labels}
     if by == "wheelset" and len(drawn) == 1:
         wheelset = drawn.pop()
@@ -173,11 +173,6 @@ def frame(axes: Axes, quantity: Quantity, heading: str) -> None:
     if high - low < 2.0 * quantity.least:
         middle = 0.5 * (low + high)
         axes.set_ylim(middle - quantity.least, middle + quantity.least)
-
-
-def capitalised(quantity: Quantity) -> str:
-    """Return the words of a quantity as a title."""
-    return quantity.long_name[:1].upper() + quantity.long_name[1:]
 
 
 def unit_label(quantity: Quantity) -> str:

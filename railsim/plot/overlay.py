@@ -9,14 +9,8 @@ from matplotlib.figure import Figure
 
 from railsim.compare import Difference
 from railsim.definitions.track.layout import curvature_sections
-from railsim.plot import style
-from railsim.plot.histories import (
-    capitalised,
-    check_not_empty,
-    draw_limit,
-    frame,
-    short_names,
-)  # fmt: skip
+from railsim.plot import histories, style
+from railsim.plot.histories import short_names
 from railsim.plot.selection import STUDY, Panel, panels
 from railsim.result import Result
 from railsim.text import unformatted
@@ -36,7 +30,7 @@ def overlay(
     axis; the distance is that of the reference body.
     """
     for label, result in results.items():
-        check_not_empty(result, label)
+        histories.check_not_empty(result, label)
     chosen = tuple(selections or _leading(list(results.values())))
     drawn = {label: panels(result, chosen) for label, result in results.items()}
     first = next(iter(results.values()))
@@ -66,8 +60,8 @@ def overlay(
                 axes.plot(result[over], line.values * panel.quantity.scale, **look)
         held = [panel for panel in same if panel is not None]
         quantity = held[0].quantity
-        draw_limit(axes, quantity, results.values())
-        frame(axes, quantity, _heading(held, places))
+        histories.draw_limit(axes, quantity, results.values())
+        histories.frame(axes, quantity, _heading(held, places))
         style.shade(axes, shown, with_names=same_radii and number < across)
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]
     labels = [f"{label}{result.end_words}" for label, result in results.items()]
@@ -124,7 +118,7 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
             colour = style.distinct(1 + labels.index(one.result))
             line = style.SIDE_LINES[one.labels.get("side", "left")]
             axes.plot(one.distance, one.values * one.quantity.scale, color=colour, ls=line)
-        frame(axes, differences[0].quantity, capitalised(differences[0].quantity))
+        histories.frame(axes, differences[0].quantity, differences[0].quantity.title)
     _legend(figure, labels, {one.labels.get("side") for one in found}, 1)
     return figure
 
@@ -150,7 +144,7 @@ def _heading(panels: Sequence[Panel], names: Mapping[str, str]) -> str:
         labels = {v for line in panel.lines for dim, v in line.labels.items() if dim != "side"}
         labels -= {quantity.long_name.rpartition(", ")[2]}
         if len(labels) != 1:
-            return capitalised(quantity)
+            return quantity.title
         place = labels.pop()
         places[unformatted(names.get(place, place))] = None
-    return f"{capitalised(quantity)}: {' / '.join(places)}"
+    return f"{quantity.title}: {' / '.join(places)}"

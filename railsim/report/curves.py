@@ -94,7 +94,7 @@ def _quantity(
     low, high, codes = encode(values)
     limit = limit_of(name, results.values())
     return {
-        "name": name, "words": quantity.long_name[:1].upper() + quantity.long_name[1:],
+        "name": name, "words": quantity.title,
         "symbol": plain_symbol(quantity.symbol), "unit": quantity.shown_unit.replace("-", ""),
         "sign": quantity.sign, "sides": sides, "low": low, "high": high,
         "least": quantity.least, "limit": limit[0] * quantity.scale if limit else None,

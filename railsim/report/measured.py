@@ -12,14 +12,7 @@ from railsim.assessment.model_comparison import ModelValidation
 from railsim.assessment.verdict import FAIL, INCOMPLETE
 from railsim.errors import input_error
 from railsim.files.access import read_bytes
-from railsim.identification import Identified
-from railsim.identification.identified import (
-    AT_BOUND,
-    correlation_table,
-    parameter_table,
-    residual_remark,
-    residual_table,
-)
+from railsim.identification import identified
 from railsim.plot import validation as plots
 from railsim.report.document import Drawing, Section, as_png, document, page_table, pictures
 from railsim.report.wear import RAILS, WHEELS, shares_of, wear_tables
@@ -118,16 +111,12 @@ def validation_part(result: ModelValidation, further: Sequence[Drawing] = ()) ->
     return Part(result.title, text, result.verdict not in words, result.remarks, sections, method)
 
 
-def identification_figures(identified: Identified) -> dict[str, Figure]:
-    """Return the pictures of an identification by their names."""
-    return {"fits": plots.fits(identified), "residuals": plots.residual_spectra(identified)}
-
-
 def identification_part(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
     """Return what a page says about an identification, by its record."""
     unidentified = record["unidentified"]
-    not_white = residual_remark((c["channel"], c["white"] is not False) for c in record["channels"])
-    bounded = [words for words in record["remarks"] if AT_BOUND in words]
+    white = ((one["channel"], one["white"] is not False) for one in record["channels"])
+    not_white = identified.residual_remark(white)
+    bounded = [words for words in record["remarks"] if identified.AT_BOUND in words]
     text = "All parameters are identified; the residuals are white."
     if unidentified:
         text = "Not all parameters can be told apart."
@@ -135,9 +124,10 @@ def identification_part(record: Mapping[str, Any], figures: list[Drawing]) -> Pa
         text = " ".join(bounded)
     elif not_white:
         text = not_white
+    values = [identified.parameter_table(record), identified.correlation_table(record)]
     sections = [
-        Section("Parameters", unidentified, [parameter_table(record), correlation_table(record)]),
-        Section("Residuals", tables=[residual_table(record)]),
+        Section("Parameters", unidentified, values),
+        Section("Residuals", tables=[identified.residual_table(record)]),
         Section("Pictures", drawings=figures),
     ]
     title = f"{record['vehicle']}: identified parameters"

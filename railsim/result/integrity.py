@@ -109,8 +109,5 @@ def _attributes(holder: h5py.File | h5py.Dataset) -> dict[str, Any]:
 def _text(attributes: Mapping[str, Any]) -> str:
     """Return attributes as text, the same before and after they were stored."""
     public = {name: value for name, value in attributes.items() if not name.startswith(_INTERNAL)}
-    return json.dumps({name: _plain(value) for name, value in public.items()}, sort_keys=True)
-
-
-def _plain(value: Any) -> Any:
-    return value if isinstance(value, str) else np.asarray(value).tolist()
+    plain = {n: v if isinstance(v, str) else np.asarray(v).tolist() for n, v in public.items()}
+    return json.dumps(plain, sort_keys=True)

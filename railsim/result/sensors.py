@@ -39,6 +39,7 @@ class Sensor:
 Sensors = Mapping[str, Sensor]
 Motion = Mapping[str, Floats]
 Names = tuple[str, ...]
+Angle = Floats | float
 
 
 def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
@@ -113,8 +114,8 @@ def motions(
     attitude, spin, _ = _axis_motions(ordered, position, rates, absolute)
     _, omega, angular = _body_readings(ordered, motion, bodies, alignment, speed)
     arm = np.array([sensor.arm for sensor in sensors.values()]).reshape(-1, 3)
-    turned = _out_of_body(np.broadcast_to(arm, (*position.shape[:2], 3)), *attitude)
-    velocity = _out_of_body(_cross(spin, arm), *attitude)
+    turned = out_of_body(np.broadcast_to(arm, (*position.shape[:2], 3)), *attitude)
+    velocity = out_of_body(_cross(spin, arm), *attitude)
     acceleration = absolute[..., :3] + _cross(angular, arm) + _cross(omega, _cross(omega, arm))
     return {
         "sensor_displacement": position[..., :3] + turned - arm,
@@ -191,25 +192,25 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
 
 
-def _out_of_body(vector: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Floats:
+def out_of_body(vector: Floats, roll: Angle, pitch: Angle, yaw: Angle) -> Floats:
     """Components in track axes of a vector in body axes: C v, C = Rz(yaw) Rx(roll) Ry(pitch)."""
     x, y, z = (vector[..., k] for k in range(3))
-    z, x = _turned(z, x, pitch)
-    y, z = _turned(y, z, roll)
-    x, y = _turned(x, y, yaw)
+    z, x = turned(z, x, pitch)
+    y, z = turned(y, z, roll)
+    x, y = turned(x, y, yaw)
     return np.stack([x, y, z], axis=-1)
 
 
 def _into_body(vector: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Floats:
     """Components in body axes of a vector in track axes: C^T v, C = Rz(yaw) Rx(roll) Ry(pitch)."""
     x, y, z = (vector[..., k] for k in range(3))
-    x, y = _turned(x, y, -yaw)
-    y, z = _turned(y, z, -roll)
-    z, x = _turned(z, x, -pitch)
+    x, y = turned(x, y, -yaw)
+    y, z = turned(y, z, -roll)
+    z, x = turned(z, x, -pitch)
     return np.stack([x, y, z], axis=-1)
 
 
-def _turned(first: Floats, second: Floats, angle: Floats) -> tuple[Floats, Floats]:
+def turned(first: Floats, second: Floats, angle: Angle) -> tuple[Floats, Floats]:
     """Components of a vector turned by an angle from the first axis towards the second."""
     cos, sin = np.cos(angle), np.sin(angle)
     return cos * first - sin * second, cos * second + sin * first
