@@ -27,7 +27,6 @@ SHOWN_UNITS = {
 }  # fmt: skip
 """SI unit of values shown in another one, and shown value over SI value."""
 
-
 Formula = Callable[[Mapping[str, Any]], Any]
 
 

@@ -35,7 +35,6 @@ from railsim.text import printable, spreadsheet_cell
 GOOD, BAD = ("pass", "complete"), ("fail", "failed", "derailed", "exceeded", "waiting")
 """Cells that a terminal shows in green, in red; the rows of the latter have a class in pages."""
 
-
 NARROWEST = 6  # width to which columns of texts shrink on a terminal [characters]
 
 

@@ -169,7 +169,6 @@ optional_track = click.argument(
     "track", metavar="[TRACK]", required=False, shell_complete=names_of("track")
 )
 
-
 extent_options = together(
     option("--start", "Start in m along the track; default 0.", "S", in_unit("m")),
     option("--duration", "Length of the run in s.", "T", in_unit("s")),

@@ -14,9 +14,8 @@ from railsim.measurement.data import Measurement
 from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED, SIDES
 from railsim.result import Result
 from railsim.result.filters import filtered
-from railsim.result.sensors import all_sensors
+from railsim.result.sensors import READINGS, all_sensors
 
-READINGS = ("sensor_acceleration", "sensor_roll_rate")
 RESTS = 1e-9  # change over the largest value up to which a channel rests
 
 

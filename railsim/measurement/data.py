@@ -106,11 +106,11 @@ class Measurement:
 
         Gaps are bridged for the filter and left out again.
         """
-
-        def band_pass(x: Floats) -> Floats:
-            return np.where(np.isnan(x), np.nan, band_passed(_bridged(x), self.rate, low, high))
-
-        return replace(self, channels={name: band_pass(x) for name, x in self.channels.items()})
+        channels = {
+            name: np.where(np.isnan(x), np.nan, band_passed(_bridged(x), self.rate, low, high))
+            for name, x in self.channels.items()
+        }
+        return replace(self, channels=channels)
 
     def moved(self, shift: float, stretch: float = 0.0) -> "Measurement":
         """Return the run with other arc lengths: s + shift + stretch (s - s of the first value)."""

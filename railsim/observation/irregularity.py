@@ -36,18 +36,18 @@ from railsim.observation import estimate, innovations
 from railsim.observation.contact import Noise, with_mean_contact
 from railsim.observation.estimate import Estimate, Irregularity, join_pieces, rms
 from railsim.observation.innovations import KINDS, Powers, Sizes, likely_sizes, spectra_of
-from railsim.observation.pieces import MARGIN, READ, STEP, Piece, pieces_of, used_channels
+from railsim.observation.pieces import MARGIN, STEP, Piece, pieces_of, used_channels
 from railsim.observation.simulated import CHANGE, SimulatedRun, refine
 from railsim.observation.smoother import filtered
-from railsim.result.sensors import all_sensors
+from railsim.result.sensors import READINGS, all_sensors
 from railsim.simulation.remarks import silent
 from railsim.track.alignment import Alignment
 
 Progress = Callable[[float], None]
 
 PERIOD = 60.0  # by which the period is longer than a piece [m]
-NOISE = dict(zip(READ, (0.05, 1e-3), strict=True))  # m/s2, rad/s, of one value
-BIAS = dict(zip(READ, (0.2, 5e-3), strict=True))
+NOISE = dict(zip(READINGS, (0.05, 1e-3), strict=True))  # m/s2, rad/s, of one value
+BIAS = dict(zip(READINGS, (0.2, 5e-3), strict=True))
 REMAINDER = 0.04  # of the power of what the linear contact leaves out, about a simulated run
 # least power of it in y and yaw for the errors: intervals of twins cover their share
 LOCAL = 0.08

@@ -10,6 +10,7 @@ from scipy.signal import firwin, oaconvolve
 from railsim.arrays import Flags, Floats
 from railsim.errors import Fault, Faults, input_error, nearest
 from railsim.measurement import Measurement
+from railsim.result.sensors import READINGS
 
 STEP = 0.25  # m
 LONGEST, OVERLAP, SHORTEST = 2000.0, 200.0, 300.0  # of pieces [m]
@@ -17,7 +18,6 @@ SPEEDS = 0.06  # largest over smallest speed of a piece, less 1
 MARGIN = 20.0  # at both ends of a record [m]
 SLOWEST = 5.0  # m/s
 AROUND_GAP = 8  # steps beside a gap that are left out
-READ = ("sensor_acceleration", "sensor_roll_rate")
 HALF = 32  # of the filter of `on_grid`, in steps of the grid
 SHAPE = 8.0  # of its window, Kaiser's: 80 dB
 
@@ -46,7 +46,7 @@ def used_channels(measurement: Measurement, sensors: dict[str, Any]) -> dict[str
     used, faults = {}, Faults()
     for name, quantity in measurement.quantities.items():
         kind, *labels = quantity.split(":")
-        if kind not in READ:
+        if kind not in READINGS:
             continue
         if labels[0] not in sensors:
             found = f"the vehicle has no sensor '{labels[0]}'"

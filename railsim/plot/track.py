@@ -28,7 +28,6 @@ KINDS = {"STR": ("straight", "0.35"), "CLO": ("transition", "#d99000"), "CIR": (
 RESOLUTION = 16000
 MOST_REMARKS = 8
 
-
 _Row = tuple[str, str, dict[str, Floats]]
 """One pair of axes over the distance: title, label, curves by name; a single one needs none."""
 

@@ -24,7 +24,6 @@ from railsim.studies.inputs import Inputs
 from railsim.text import in_words, printable
 from railsim.units import number_with_unit
 
-Record = Mapping[str, Any]
 MOST_SHOWN = 12  # values of an input of a study
 MOST_AT_REST = 3  # vehicles
 MOST_ASSUMED = 4  # pairs of a vehicle and a track

@@ -48,7 +48,6 @@ METHOD = (
     "certain of its parameters.",
 )
 
-
 TOLERANCES = (
     "First order. RSS: root of the sum of squares of the single deviations; worst case: sum of "
     "their magnitudes."

@@ -27,12 +27,11 @@ from railsim.report.inputs import inputs_section
 from railsim.report.limits import assess_runs, remark_table
 from railsim.report.published import published_comparisons
 from railsim.result import Results
-from railsim.studies.columns import WORDS, columns, parameters
+from railsim.studies.columns import WORDS, Record, columns, parameters
 from railsim.studies.inputs import Inputs, inputs_of, units_of
 from railsim.text import printable
 from railsim.version import __version__
 
-Record = Mapping[str, Any]
 PEAKS = (
     "Largest magnitudes over all {instants} after the start of the run, with their signs; "
     "wheelsets are numbered from the leading end."

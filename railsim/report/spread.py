@@ -8,9 +8,8 @@ from statistics import median
 from typing import Any
 
 from railsim.arrays import largest_first
-from railsim.studies.columns import RANKED, WORDS, columns, parameters
+from railsim.studies.columns import RANKED, WORDS, Record, columns, parameters
 
-Record = Mapping[str, Any]
 LEAST = 3  # runs, for a spread
 WORST = 5  # runs of each quantity
 

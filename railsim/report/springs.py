@@ -42,7 +42,6 @@ FORMS = {
     '(equilibrium = "energy"); the reference\'s own numbers are those of "grossi".',
 }
 
-
 SHEETS = (
     "In the manner of EN 13298: dimensions, stiffness, mass and natural frequency of the coils "
     "(EN 13906-1), and each spring under each load. Stresses without (tau) and with the factor "

@@ -322,7 +322,6 @@ FACTS = (
     "patches_out_of_range",
 )  # fmt: skip
 
-
 OF_FACTS = frozenset({*PEAK_QUANTITIES, "Q0", "time", "distance", "wheelset_distance"})
 """Quantities that facts are taken from."""
 

@@ -19,6 +19,7 @@ from railsim.track.alignment import Alignment
 
 BOX = 1.0  # distance of a sensor on an axlebox from the middle of the wheelset [m]
 MOTIONS = ("position", "velocity", "acceleration")
+READINGS = ("sensor_acceleration", "sensor_roll_rate")  # what `readings` returns
 
 
 @dataclass(frozen=True)

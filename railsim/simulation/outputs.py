@@ -19,7 +19,7 @@ from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import against_rails, parts_of_wheel
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
-from railsim.result.sensors import all_sensors, motions, readings
+from railsim.result.sensors import READINGS, all_sensors, motions, readings
 from railsim.result.sinks import matches
 from railsim.simulation.own_outputs import OwnOutputs
 from railsim.track.alignment import alignment_of
@@ -142,9 +142,6 @@ class Chunk(Mapping[str, Floats]):
 
     def __len__(self) -> int:
         return len(self._values.keys() | self._later.keys())
-
-
-READINGS = ("sensor_acceleration", "sensor_roll_rate")
 
 
 def extra_quantities(outputs: Outputs, track: Track) -> list[Quantity]:

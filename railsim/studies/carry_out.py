@@ -61,11 +61,8 @@ def carry_out_cases(cases: Sequence[Case], spec: StudySpec, folder: Path, **how:
     points = [Point(c.name, run, c.labels, c.key) for c, run in zip(cases, runs, strict=True)]
     check_names(points)
     by_point = dict(zip(points, cases, strict=True))
-
-    def load(requested: Sequence[Point]) -> list[Case]:
-        return [by_point[point] for point in requested]
-
-    return carry_out(points, load, spec, folder, Execution(longest_first=True, **how))
+    execution = Execution(longest_first=True, **how)
+    return carry_out(points, lambda some: [by_point[p] for p in some], spec, folder, execution)
 
 
 def carry_out(

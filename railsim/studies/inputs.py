@@ -1,9 +1,9 @@
 """Vehicles, tracks and settings of runs, from their results or from the files of their study."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import chdir
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
@@ -11,10 +11,9 @@ from railsim.definitions.units_of_keys import unit_of_input
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import RailsimError
 from railsim.result import Results
+from railsim.studies.columns import Record
 from railsim.studies.plan import Plan
 from railsim.studies.study import stored_spec
-
-Record = Mapping[str, Any]
 
 
 class Inputs(NamedTuple):

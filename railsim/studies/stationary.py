@@ -57,7 +57,6 @@ LIFTED = (
     "the force needed for that"
 )
 
-
 ENDS = 0.01  # of the mean axle load, by which those of both ends may differ
 ONE_END = (
     "axle loads of the two ends differ: guiding is that of the end that leads in the file; test "
