@@ -54,35 +54,27 @@ if TYPE_CHECKING:
     from railsim.studies.optimise import optimise
     from railsim.studies.study import study
 
-_HOMES = {
-    "Assessment": "railsim.assessment", "Description": "railsim.description",
-    "Identified": "railsim.identification", "InputError": "railsim.errors",
-    "Measurement": "railsim.measurement", "Mechanism": "railsim.definitions.mechanism.definition",
-    "ModelError": "railsim.errors", "ModelValidation": "railsim.assessment.model_comparison",
-    "Profile": "railsim.profiles", "Result": "railsim.result",
-    "Sensitivity": "railsim.identification", "Settings": "railsim.definitions.settings",
-    "Simulation": "railsim.simulation", "StaticLoads": "railsim.model.statics",
-    "Track": "railsim.definitions.track.definition",
-    "TrailingArmSuspension": "railsim.definitions.spring",
-    "Vehicle": "railsim.definitions.vehicle.definition", "animate": "railsim.animation",
-    "assess": "railsim.assessment", "critical_speed": "railsim.stability.critical_speed",
-    "curving": "railsim.stability.curving",
-    "describe": "railsim.description", "identify": "railsim.identification",
-    "load_comfort_limits": "railsim.definitions.loading", "load_measurement": "railsim.measurement",
-    "load_mechanism": "railsim.definitions.loading", "load_profile": "railsim.profiles",
-    "load_running_limits": "railsim.definitions.loading",
-    "load_scenario": "railsim.definitions.loading", "load_settings": "railsim.definitions.loading",
-    "load_spring": "railsim.definitions.loading", "load_track": "railsim.definitions.loading",
-    "load_vehicle": "railsim.definitions.loading", "mid_curves": "railsim.result",
-    "modes": "railsim.linear.modes", "open_result": "railsim.result",
-    "open_study": "railsim.studies.gathered",
-    "optimise": "railsim.studies.optimise", "peaks": "railsim.result",
-    "root_locus": "railsim.linear.modes", "sensitivity": "railsim.identification",
-    "simulate": "railsim.simulation", "simulate_together": "railsim.simulation",
-    "static_loads": "railsim.model.statics", "study": "railsim.studies.study",
-    "validate_model": "railsim.assessment.model_validation",
-    "write_report": "railsim.report.write",
+_NAMES = {
+    "animation": ("animate",), "assessment": ("Assessment", "assess"),
+    "assessment.model_comparison": ("ModelValidation",),
+    "assessment.model_validation": ("validate_model",),
+    "definitions.loading": ("load_comfort_limits", "load_mechanism", "load_running_limits",
+        "load_scenario", "load_settings", "load_spring", "load_track", "load_vehicle"),
+    "definitions.mechanism.definition": ("Mechanism",), "definitions.settings": ("Settings",),
+    "definitions.spring": ("TrailingArmSuspension",), "definitions.track.definition": ("Track",),
+    "definitions.vehicle.definition": ("Vehicle",), "description": ("Description", "describe"),
+    "errors": ("InputError", "ModelError"),
+    "identification": ("Identified", "Sensitivity", "identify", "sensitivity"),
+    "linear.modes": ("modes", "root_locus"), "measurement": ("Measurement", "load_measurement"),
+    "model.statics": ("StaticLoads", "static_loads"), "profiles": ("Profile", "load_profile"),
+    "report.write": ("write_report",), "result": ("Result", "mid_curves", "open_result", "peaks"),
+    "simulation": ("Simulation", "simulate", "simulate_together"),
+    "stability.critical_speed": ("critical_speed",), "stability.curving": ("curving",),
+    "studies.gathered": ("open_study",), "studies.optimise": ("optimise",),
+    "studies.study": ("study",),
 }  # fmt: skip
+"""Public names by the modules that hold them."""
+_HOMES = {name: f"railsim.{home}" for home, names in _NAMES.items() for name in names}
 
 __all__ = [
     "Assessment", "Description", "Identified", "InputError", "Measurement", "Mechanism",

@@ -300,6 +300,5 @@ def difference_table(differences: Sequence[Difference]) -> Table:
     rows = []
     for d in differences:
         value = Amount(d.largest[0], Column.of(d.quantity))
-        side = d.labels.get("side", "")
-        rows.append([d.quantity.words, d.result, side, value, d.largest[1]])
+        rows.append([d.quantity.words, d.result, d.labels.get("side", ""), value, d.largest[1]])
     return Table([*heads, largest, PLACE[1]], rows)

@@ -55,8 +55,7 @@ def command(
     table, strip = found.table(), heat_strip(found.cells, found.shares, CELL)
     output.write("heat_strip.png", strip)
     contents = found.table(), found.share, strip, found.notes, found.sections
-    page = assessed_track_page(Path(recording).name, *contents)
-    output.write("report.html", page)
+    output.write("report.html", assessed_track_page(Path(recording).name, *contents))
     more = len(table) - SHOWN
     table.rows = table.rows[:SHOWN]
     none = f"no vehicle exceeds {100.0 * found.share:g} % of a limit at any place"

@@ -235,8 +235,7 @@ def faults_in(file: str, kind: str, name: str) -> AbstractContextManager[None]:
     def locate(fault: Fault) -> Fault:
         if fault.file not in ("", name):
             return fault
-        source = read_source(find_file(file, kind), kind)
-        return source.fault(fault.key, fault.found, fault.allowed)
+        return read_source(find_file(file, kind), kind).fault(fault.key, fault.found, fault.allowed)
 
     return changed_faults(locate)
 

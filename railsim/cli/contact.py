@@ -208,8 +208,7 @@ def _write(
         plot.conicity_figure({names + gauge: (summary.amplitudes, summary.conicity)}),
         plot.patches_figure(contacts, load, exact, other, labels, f", {title}"),
     )
-    for name, part in zip((*TABLES, *PICTURES), content, strict=True):
-        output.write(name, part)
+    output.write_all(dict(zip((*TABLES, *PICTURES), content, strict=True)))
     if gauges:
         output.write(MAP[0], plot.conicity_map_figure(gauges, summary.amplitudes, by_gauge, title))
         output.write(MAP[1], tables.conicity_map_table(summary, gauges, by_gauge))
@@ -228,8 +227,7 @@ def _write_creep(output: cli.Output, patch: "Patch", rows: Sequence[dict[str, An
     fields = {case: exact_force(patch, creepage) for case, creepage in creepages.items()}
     figures = (creep_curves_figure(patch, LAWS), traction_figure(fields, patch.mu * patch.N))
     columns = [Column(name, unit="1/m" if name == "phi" else "") for name in rows[0]]
-    for name, content in zip(CREEP, (*figures, Table(columns, rows)), strict=True):
-        output.write(name, content)
+    output.write_all(dict(zip(CREEP, (*figures, Table(columns, rows)), strict=True)))
 
 
 def _build_creep_table(workers: int, output: cli.Output) -> None:
@@ -248,5 +246,4 @@ def _build_creep_table(workers: int, output: cli.Output) -> None:
     difference = float(np.abs(nodes.force - shipped_nodes().force).max())
     words = f"largest difference from the shipped table {difference:.1e} of mu N"
     output.written.append(folder / CREEP_TABLE)
-    record = {"file": str(folder / CREEP_TABLE), "largest_difference": difference}
-    output.answer(record, [words])
+    output.answer({"file": str(folder / CREEP_TABLE), "largest_difference": difference}, [words])

@@ -69,7 +69,7 @@ def command(
         found = irregularity(measurement, coach, rails, **more)
     if folder is not None:
         output.written += found.write(folder)
-    output.write(FILES[0], found.record())
-    output.write(FILES[1], lambda: irregularity_figure(found))
+    record = found.record()
+    output.write_all({FILES[0]: record, FILES[1]: lambda: irregularity_figure(found)})
     parts: list[Any] = [found.table(), "", found.forces_table(), "", *found.notes]
-    output.answer(found.record(), parts, found.remarks)
+    output.answer(record, parts, found.remarks)

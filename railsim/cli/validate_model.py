@@ -53,8 +53,7 @@ def command(
         figures, page = validation_figures(found), measured_page([validation_part(found)])
         pictures = figures["scatter"], figures["overlays"]
         content = found.record(), found.section_table(), page, *pictures
-        for name, one in zip(FILES, content, strict=True):
-            output.write(name, one)
+        output.write_all(dict(zip(FILES, content, strict=True)))
     verdict = f"{found.vehicle} against {', '.join(found.runs)}: {found.verdict}"
     output.answer(found.record(), [verdict, found.table()], found.remarks)
     return cli.LIMIT_EXCEEDED if fail and found.verdict == "fail" else cli.DONE

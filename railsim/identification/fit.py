@@ -282,13 +282,11 @@ def _places(problem: Problem, x: Floats) -> Floats:
 
 def _suspicions(problem: Problem, x: Floats, *, clocks: bool) -> Iterator[str]:
     for prepared, values in zip(problem.placed(x), problem.series(x), strict=True):
-        measured, simulated = (
-            {
-                n: banded(x, prepared.step, problem.form.band)
-                for n, x in zip(prepared.names, rows, strict=True)
-            }
+        in_band = (
+            [banded(row, prepared.step, problem.form.band) for row in rows]
             for rows in (prepared.measured, values)
         )
+        measured, simulated = (dict(zip(prepared.names, rows, strict=True)) for rows in in_band)
         quantities = dict(zip(prepared.names, prepared.run.selections, strict=True))
         for sentence in suspicions(measured, simulated, quantities, prepared.step, clocks=clocks):
             yield f"{prepared.run.name}: {sentence}"

@@ -131,8 +131,7 @@ def parse_keys(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track)
             chosen.append(p)
         except (KeyError, ValueError) as error:
             label = text if isinstance(text, str) else text.name
-            messages = [*map(str, error.args), ""][:2]
-            faults.append(argument_fault("parameters", label, *messages))
+            faults.append(argument_fault("parameters", label, *[*map(str, error.args), ""][:2]))
         except InputError as error:
             faults += error.faults
     if not faults and not chosen:

@@ -238,11 +238,11 @@ def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
     return path
 
 
-def to_bytes(figure: Figure, form: str = "png") -> bytes:
-    """Return the file of a figure in a format of matplotlib's."""
+def to_bytes(figure: Figure, form: str = "png", **how: Any) -> bytes:
+    """Return the file of a figure in a format of matplotlib's; `how`: of `Figure.savefig`."""
     stream = BytesIO()
     with warnings.catch_warnings():
         # letters that the font lacks are drawn as boxes, and that is seen
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        figure.savefig(stream, format=form)
+        figure.savefig(stream, format=form, **how)
     return stream.getvalue()

@@ -8,7 +8,6 @@ from calendar import month_name
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from io import BytesIO
 from typing import Any
 
 from markupsafe import Markup
@@ -17,7 +16,7 @@ from matplotlib.figure import Figure
 from railsim import table as values
 from railsim.design_checks import Check, verdict
 from railsim.page import render_page
-from railsim.plot.style import styled
+from railsim.plot.style import styled, to_bytes
 from railsim.version import __version__
 
 Cell = str | tuple[str, str]  # a value, or a value with small print below it
@@ -92,10 +91,8 @@ IMAGE = Markup('<img alt="{}" width="{}" src="data:image/png;base64,{}">')
 
 def as_png(figure: Figure) -> bytes:
     """Draw a figure as the bytes of a PNG file."""
-    buffer = BytesIO()
     with styled():
-        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
-    return buffer.getvalue()
+        return to_bytes(figure, dpi=DPI, metadata={"Software": None})
 
 
 def pictures(

@@ -277,14 +277,11 @@ def _attributes(quantity: Quantity) -> Values:
 def _peak_attributes(name: str) -> tuple[Values, Sequence[str]]:
     """Units, names and dimensions of largest and smallest values, their times or distances."""
     base = sinks.peak_quantity(name)
-    quantity = QUANTITIES[base]
-    long_name = f"largest and smallest {quantity.long_name}"
-    if name != base:
-        other = QUANTITIES[name.removeprefix(f"{base}_")]
-        attributes = {"units": other.unit, "long_name": f"{long_name}: {other.long_name}"}
-    else:
-        attributes = {"units": quantity.unit, "long_name": long_name}
-    return attributes, (f"{PEAKS}/extreme", *quantity.dims[1:])
+    quantity, stored = QUANTITIES[base], QUANTITIES[name.removeprefix(f"{base}_")]
+    what = "" if stored is quantity else f": {stored.long_name}"
+    long_name = f"largest and smallest {quantity.long_name}{what}"
+    dims = f"{PEAKS}/extreme", *quantity.dims[1:]
+    return {"units": stored.unit, "long_name": long_name}, dims
 
 
 def _write_profile(contents: Contents, name: str, profile: Profile) -> None:

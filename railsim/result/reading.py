@@ -95,8 +95,7 @@ def open_run(path: str | Path) -> Result:
     missing += [name for name in DIMENSIONS if name not in result.coordinates]
     Faults(Fault(str(path), name, "missing", AS_WRITTEN) for name in missing).check()
     if result.status not in STATES:
-        found = f"'{result.status}'"
-        raise input_error(path, found, f"allowed: {', '.join(STATES)}", "status")
+        raise input_error(path, f"'{result.status}'", f"allowed: {', '.join(STATES)}", "status")
     for name in ARRAYS:
         if not np.all(np.isfinite(result[name])):
             raise input_error(path, "holds what is not finite", REMEDY, name)

@@ -32,6 +32,7 @@ from railsim.result.hdf5 import PLAIN, Storage, write
 from railsim.result.sinks import EVERYTHING, matches
 from railsim.simulation import simulate
 from railsim.simulation.first_start import compile_time_loop, is_compiled
+from railsim.simulation.remarks import silent
 from railsim.studies.analyses import numbers_and_remarks
 from railsim.studies.case import Case, run_case
 from railsim.studies.records import Record
@@ -237,12 +238,9 @@ def cluster(address: str) -> Any:
 
 def run_briefly() -> None:
     """Load the compiled kernels, or compile them, by a run of two steps without remarks."""
-    logging.disable()
-    try:
+    with silent():
         coach, track = load_vehicle("coach_manchester"), load_track("straight")
         simulate(coach, track, speed=20.0, duration=0.01)
-    finally:
-        logging.disable(logging.NOTSET)
 
 
 def compile_on_cluster(client: Any, remark: Callable[[str], None]) -> None:

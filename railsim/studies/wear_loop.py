@@ -312,8 +312,7 @@ def _file_name(
 
 def _unworn(wearing: Wearing, run: Run) -> list[Profile]:
     """Profiles of a run that do not wear."""
-    both = (*used_profiles(run.vehicle), *used_profiles(run.track))
-    names = {name for _, name, _ in both}
+    names = {name for _, name, _ in (*used_profiles(run.vehicle), *used_profiles(run.track))}
     return [load_profile(name) for name in names - {*wearing.names.values()}]
 
 
