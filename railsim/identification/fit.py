@@ -188,11 +188,17 @@ def _least_squares(
     """Return the coordinates with the least sum of squares, and whether the search has settled."""
     from scipy.optimize import least_squares
 
+    def vector(z: Floats) -> Floats:
+        return problem.step_residuals(z - 1.0)
+
+    def jacobian(z: Floats) -> Floats:
+        return problem.derivatives_near(z - 1.0)
+
     # about 1, so that the first region of trust has the size of the parameters
     solution = least_squares(
-        lambda z: problem.step_residuals(z - 1.0),
+        vector,
         1.0 + np.clip(x, bounds[0] + 1e-9, bounds[1] - 1e-9),
-        lambda z: problem.derivatives_near(z - 1.0),
+        jacobian,
         tuple(1.0 + bounds),
         method="trf",
         ftol=tolerance,

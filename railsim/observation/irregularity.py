@@ -73,10 +73,7 @@ class Assumed:
     bias: float = BIAS["sensor_acceleration"]
 
     def check(self) -> None:
-        """Refuse what cannot be.
-
-        Raises InputError.
-        """
+        """Raise InputError: what cannot be."""
         low, high = self.wavelengths
         known, faults = self.spectrum in SPECTRA, Faults()
         faults.require(known, "spectrum", f"found {self.spectrum}", nearest(self.spectrum, SPECTRA))

@@ -30,7 +30,7 @@ from railsim.definitions.loading import load_running_limits, load_track, load_ve
 from railsim.definitions.track.layout import even_line, is_uniform
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, Faults, InputError, argument_error, input_error
+from railsim.errors import Fault, Faults, argument_error, input_error
 from railsim.files.access import check_folder, write_folder
 from railsim.notation import SIDES
 from railsim.result import Result, open_result
@@ -194,13 +194,11 @@ def assess_track(
     if wrong := [speed for speed in speeds if not low <= speed <= high]:
         raise argument_error("speeds", f"found {wrong[0]:.12g} m/s", f"{low:g} to {high:g} m/s")
     missing = [n for n, v in tested.items() if v.service is None]
-    if missing:
-        allowed = "add [service] with admissible_speed and cant_deficiency"
-        raise InputError([Fault(name, "service", "missing", allowed) for name in missing])
+    allowed = "add [service] with admissible_speed and cant_deficiency"
+    Faults(Fault(name, "service", "missing", allowed) for name in missing).check()
     bare = [n for n, v in tested.items() if POINTS[0] not in sensors(v)]
-    if bare:
-        found, allowed = "a vehicle of wheelsets alone", "one with a body, whose floor is judged"
-        raise InputError([Fault(name, "bodies", found, allowed) for name in bare])
+    found, allowed = "a vehicle of wheelsets alone", "one with a body, whose floor is judged"
+    Faults(Fault(name, "bodies", found, allowed) for name in bare).check()
     begin, end = _extent(track)
     count = max(1, round((end - begin) / PIECE))
     edges = np.linspace(begin, end, count + 1)

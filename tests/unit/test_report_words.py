@@ -95,7 +95,7 @@ def test_an_identification_is_judged_by_the_worst_of_its_faults(
     monkeypatch, unidentified, remarks, white, words, ok, left
 ):
     for name in ("parameter_table", "correlation_table", "residual_table"):
-        monkeypatch.setattr(measured, name, lambda _: Table(["a"], []))
+        monkeypatch.setattr(measured.identified, name, lambda _: Table(["a"], []))
     channels = [{"channel": f"c{k}", "white": one} for k, one in enumerate(white)]
     record = {
         "unidentified": unidentified,
