@@ -10,9 +10,11 @@ it was.
 
 import hashlib
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -34,27 +36,21 @@ LARGEST_KEPT = 2_000_000_000  # bytes
 Task = tuple[Callable[..., Any], tuple[Any, ...]]
 
 
-@dataclass
-class Workers:
+class Workers(ExitStack):
     """Processes for tasks, within a block; with one worker everything happens in this process."""
 
-    count: int
-    _pool: WorkerPool | None = field(default=None, init=False, repr=False)
+    def __init__(self, count: int) -> None:
+        super().__init__()
+        self.count = count
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        if self._pool is not None:
-            self._pool.__exit__(*error)
-            self._pool = None
+    @cached_property
+    def _pool(self) -> WorkerPool:
+        return self.enter_context(WorkerPool(self.count))
 
     def run(self, tasks: Sequence[Task]) -> list[Any]:
         """Return what the tasks return, in their order; raise the first error of a task."""
         if self.count <= 1 or len(tasks) <= 1:
             return [function(*arguments) for function, arguments in tasks]
-        if self._pool is None:
-            self._pool = WorkerPool(self.count)
         futures = [self._pool.submit(function, *arguments) for function, arguments in tasks]
         return [future.result() for future in futures]
 
