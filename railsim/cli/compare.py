@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli import common as cli
-from railsim.errors import InputError
+from railsim.errors import Faults
 
 if TYPE_CHECKING:
-    from railsim.compare import Difference
     from railsim.studies.comparable import Group
 
 FILES = ("compare.csv", "compare.json", "compare.png", "differences.png")
@@ -64,9 +63,13 @@ def _compare_group(
 ) -> tuple[dict[str, Any], list[Any]]:
     """Write what is compared with each other; return its record and the parts that are printed."""
     from railsim import compare
+    from railsim.plot.selection import STUDY
 
     rows, unlike = compare.compare(results), compare.conditions(results)
-    differing, why = _differing(results)
+    faults, differing = Faults(), list[compare.Difference]()
+    with faults.caught():
+        differing = compare.differences(results, STUDY)
+    why = [f"no differences along the track: {fault}" for fault in faults]
     record = {
         "results": list(results),
         "status": {label: result.status for label, result in results.items()},
@@ -103,14 +106,3 @@ def _file_name(name: str, title: str) -> str:
 
     stem, _, ending = name.partition(".")
     return f"{stem}_{in_a_name(title)}.{ending}" if title else name
-
-
-def _differing(results: "Group") -> "tuple[list[Difference], list[str]]":
-    """Return differences along the track, or why there are none."""
-    from railsim.compare import differences
-    from railsim.plot.selection import STUDY
-
-    try:
-        return differences(results, STUDY), []
-    except InputError as error:
-        return [], [f"no differences along the track: {fault}" for fault in error.faults]

@@ -15,7 +15,7 @@ from railsim.assessment.verdict import DERAILED, FAIL, PASS, Verdict
 from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
 from railsim.compare import differing
-from railsim.errors import InputError, listed
+from railsim.errors import Faults, listed
 from railsim.profiles.used import used_profiles
 from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table, page_table
 from railsim.result import Results
@@ -92,13 +92,11 @@ def remark_table(remarks: Sequence[str]) -> Table:
 
 def _assess_vehicles(runs: Results, standard: str) -> tuple[list[Assessment], list[str]]:
     """Assess vehicle by vehicle, so that missing quantities of one do not affect the others."""
-    assessments: list[Assessment] = []
-    remarks: list[str] = []
+    faults, assessments = Faults(), list[Assessment]()
     for group in by_vehicle(runs, loads=standard in RUNNING):
-        try:
+        with faults.caught():
             assessments += assess(group, standard, coarse=True)
-        except InputError as error:
-            remarks += [f"{standard}: {fault}" for fault in error.faults]
+    remarks = [f"{standard}: {fault}" for fault in faults]
     return assessments, [*remarks, *(remark for one in assessments for remark in one.remarks)]
 
 

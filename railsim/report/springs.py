@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from railsim.definitions.spring import TrailingArmSuspension
 from railsim.design_checks import check_table
-from railsim.errors import InputError
+from railsim.errors import Faults
 from railsim.plot import springs as plots
 from railsim.report.document import Drawing, Section, as_png, design_page, pictures
 from railsim.springs import tables
@@ -88,12 +88,11 @@ def compute(suspension: TrailingArmSuspension, search: "SearchResult | None" = N
 
     Raises InputError: the suspension cannot be verified.
     """
-    designed, remarks = None, []
+    designed, faults = None, Faults()
     if suspension.target is not None and suspension.inner is not None:
-        try:
+        with faults.caught():
             designed = design(suspension)
-        except InputError as error:
-            remarks = [f"Design: {fault.key}: {fault.found}." for fault in error.faults]
+    remarks = (f"Design: {fault.key}: {fault.found}." for fault in faults)
     return PageResults(
         suspension=suspension, verification=verify(suspension), design=designed,
         fatigue=fatigue(suspension) if suspension.fatigue is not None else None,

@@ -175,7 +175,8 @@ def scenario_cases(
         for (number, state, condition), (name, part), point in several:
             texts = [*scenario.assignments, *(f"{key}={v}" for key, v in point.items())]
             label = [short_name(vehicle), state, name, *map(in_a_name, point.values())]
-            try:
+            made = None
+            with faults.caught():
                 if condition:
                     if condition.load not in (None, "design", *loaded.loads):
                         continue
@@ -186,9 +187,6 @@ def scenario_cases(
                 service = _service(run)
                 case = load_case(replace(run, speed=part_speed(part.speed, service)))
                 made = in_condition(case.vehicle, state, condition) if condition else case.vehicle
-            except InputError as error:
-                faults += error.faults
-                continue
             if made is None:
                 continue
             labels = {**case.labels, "part": name, **point}
