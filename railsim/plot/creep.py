@@ -53,10 +53,8 @@ def creep_curves_figure(
         panel.set_title(name)
         panel.axhline(0.0, color="0.6", lw=0.6, zorder=0)
         panel.set_xlim(0.0, LARGEST)
-    for panel in panels[::3]:
-        panel.set_ylabel("force over $\\mu N$")
-    for panel in panels[3:]:
-        panel.set_xlabel("magnitude of the normalised creepage")
+    words_of_axes = "magnitude of the normalised creepage", "force over $\\mu N$"
+    label_grid(panels, len(panels), 3, words_of_axes)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, ncols=len(labels), loc="lower center", bbox_to_anchor=(0.5, 0.0))
     return figure

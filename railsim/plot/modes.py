@@ -29,9 +29,8 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
     `title`: By default vehicle, track and contact.
     """
     figure = Picture(10.2, 7.4, title or locus.title.replace(": ", "\n", 1))
-    grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.0], height_ratios=[1.15, 1.0])
-    damping, frequency = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
-    plane = figure.add_subplot(grid[1, 1])
+    panels = figure.subplot_mosaic("dd;fp", height_ratios=[1.15, 1.0])
+    damping, frequency, plane = panels.values()
     values = np.array(locus.values)
     eigenvalues = locus.eigenvalues
     with np.errstate(invalid="ignore"):

@@ -60,9 +60,7 @@ def stiffness_figure(result: Verification) -> Figure:
 def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -> Figure:
     """Deflection, rotation of the arm and heights of the springs over the load."""
     figure = Picture(7.6, 5.4, edges=(0.085, 0.09, 0.985, 0.98, 0.2, 0.38))
-    grid = figure.add_gridspec(2, 2)
-    deflection, rotation = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
-    heights = figure.add_subplot(grid[1, :])
+    deflection, rotation, heights = figure.subplot_mosaic("dr;hh").values()
     curve = _curve(result)
     load = curve["load"] * 1e-3
     for axes, name in ((deflection, "deflection"), (rotation, "rotation")):

@@ -43,14 +43,12 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     kinds = dict.fromkeys(element.definition.kind for element in flat.elements)
     colours = {kind: distinct(i) for i, kind in enumerate(kinds)}
     figure = Picture(11.0, 9.0, unformatted(title or vehicle.name))
-    grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
+    panels = figure.subplot_mosaic("sss;ttt;abc", height_ratios=[1.0, 1.0, 1.7]).values()
     leader, *others = (w.position[0] for w in flat.of_kind("wheelset"))
     last = min([leader, *(x for x in others if leader - x < BOGIE)])
     end, boxes = (last - 0.8, leader + 0.8), body_boxes(flat)
-    cells = (grid[0, :], grid[1, :], grid[2, 0], grid[2, 1], grid[2, 2])
     ends = (None, None, end, end, None)
-    for cell, view, limits in zip(cells, (SIDE, TOP, SIDE, TOP, BEHIND), ends, strict=True):
-        axes = figure.add_subplot(cell)
+    for axes, view, limits in zip(panels, (SIDE, TOP, SIDE, TOP, BEHIND), ends, strict=True):
         for box in boxes.values():
             (x, y), (far_x, far_y) = np.array(box)[:, list(view)]
             look: Any = {"fc": FILL, "ec": OUTLINE, "lw": 0.7, "zorder": 0.5}

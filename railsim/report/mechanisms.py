@@ -27,7 +27,7 @@ from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tolerance import scatter
 from railsim.plot import mechanisms as plots
 from railsim.plot.style import styled
-from railsim.report.document import Drawing, Section, as_png, design_page, pictures
+from railsim.report.document import Section, as_png, design_page, pictures
 from railsim.table import Table
 
 if TYPE_CHECKING:
@@ -282,27 +282,24 @@ def page(contents: PageResults, images: Mapping[str, bytes]) -> str:
     """Return the page as HTML, with PNG pictures by the names of `figures`."""
     result = contents.result
     definition, made = result.definition, checks(result)
-
-    def drawings(*names: str) -> list[Drawing]:
-        return pictures(images, CAPTIONS, names)
-
+    drawings = partial(pictures, images, CAPTIONS)
     rows = [tables.position_table(result), tables.published_table(result)]
     rows = [table for table in (*rows, check_table(made, notes=True)) if len(table)]
-    sections = [Section("Results", tables.sentences(result), rows, drawings("drawing", "path"))]
-    compared = drawings("comparison", "comparison_held", "comparison_zone")
+    sections = [Section("Results", tables.sentences(result), rows, drawings(["drawing", "path"]))]
+    compared = drawings(["comparison", "comparison_held", "comparison_zone"])
     if (optimum := contents.optimum) is not None:
         found = tables.optimum_sentences(optimum), tables.optimum_tables(optimum)
-        sections.append(Section("Search", *found, drawings("search")))
+        sections.append(Section("Search", *found, drawings(["search"])))
         sections.append(Section("Before and after the search", drawings=compared))
     if len(contents.results) > 1:
-        compared += drawings(*(name for name in images if name.startswith("drawing_")))
+        compared += drawings(name for name in images if name.startswith("drawing_"))
         rows = [tables.comparison_table(contents.results)]
         sections.append(Section("Comparison", [], rows, compared))
-    kinematics = drawings("kinematics", "actuators", "angles", "cam")
+    kinematics = drawings(["kinematics", "actuators", "angles", "cam"])
     forces = ("ratio_force", "pressure", "carpet", "contact", "gas_springs", "cases", "time")
     rows = [tables.reaction_table(result)]
     sections.append(Section("Kinematics", drawings=kinematics))
-    sections.append(Section("Forces and motion", [], rows, drawings(*forces)))
+    sections.append(Section("Forces and motion", [], rows, drawings(forces)))
     if choices := selection(result):
         sections.append(Section("Selection", [], [tables.selection_table(choices)]))
     if definition.tolerances:

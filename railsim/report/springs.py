@@ -5,6 +5,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ from railsim.definitions.spring import TrailingArmSuspension
 from railsim.design_checks import check_table
 from railsim.errors import Faults
 from railsim.plot import springs as plots
-from railsim.report.document import Drawing, Section, as_png, design_page, pictures
+from railsim.report.document import Section, as_png, design_page, pictures
 from railsim.springs import tables
 from railsim.springs.datasheet import data_sheets
 from railsim.springs.design import Design, design
@@ -135,10 +136,7 @@ def page(results: PageResults, figures: Mapping[str, bytes]) -> str:
     """Return the page as HTML, with PNG pictures by the names of `figures`."""
     suspension, verification = results.suspension, results.verification
     sheets = data_sheets(suspension, verification)
-
-    def drawings(*names: str) -> list[Drawing]:
-        return pictures(figures, CAPTIONS, names)
-
+    drawings = partial(pictures, figures, CAPTIONS)
     sections = [Section("Inputs", [], tables.input_tables(suspension))]
     if results.design is not None:
         low, high = (load * 1e-3 for load in results.design.load_range)
@@ -149,12 +147,12 @@ def page(results: PageResults, figures: Mapping[str, bytes]) -> str:
             f"{low:.3f} to {high:.3f} kN."
         )
         designed = [tables.design_table(suspension, results.design)]
-        sections.append(Section("Design", [text], designed, drawings("coils")))
+        sections.append(Section("Design", [text], designed, drawings(["coils"])))
     cases = [tables.load_table(suspension), tables.case_table(verification)]
     listed = [tables.sheet_table(sheets), tables.loaded_table(sheets)]
     no_fatigue = [] if suspension.fatigue else [tables.NO_FATIGUE]
     sections += [
-        Section("Load cases", [], cases, drawings("stiffness", "deflection", "arm")),
+        Section("Load cases", [], cases, drawings(["stiffness", "deflection", "arm"])),
         Section("Checks", no_fatigue, [check_table(verification.checks, notes=True)]),
         Section("Data sheets of the springs", [SHEETS], listed),
     ]
@@ -165,11 +163,11 @@ def page(results: PageResults, figures: Mapping[str, bytes]) -> str:
             "stresses with the factor for the curvature of the wire and the lateral load."
         )
         rows = [tables.fatigue_table(results.fatigue)]
-        sections.append(Section("Fatigue", [text], rows, drawings("goodman_smith")))
+        sections.append(Section("Fatigue", [text], rows, drawings(["goodman_smith"])))
     if results.ride_heights is not None:
         rows = [tables.ride_height_table(results.ride_heights)]
         title = "Scatter of the ride height"
-        sections.append(Section(title, [SCATTER], rows, drawings("ride_height")))
+        sections.append(Section(title, [SCATTER], rows, drawings(["ride_height"])))
     if (found := results.search) is not None:
         text = (
             f"{found.tried} nests tried, {found.feasible} of them within all limits before "
@@ -177,7 +175,7 @@ def page(results: PageResults, figures: Mapping[str, bytes]) -> str:
             "sizes; the limits listed are those active at each optimum."
         )
         rows = [tables.search_table(found)]
-        sections.append(Section("Feasible nests", [text], rows, drawings("search")))
+        sections.append(Section("Feasible nests", [text], rows, drawings(["search"])))
     method = [*METHOD, FORMS[suspension.arm.equilibrium], *results.remarks]
     title = f"Primary suspension: {suspension.name}"
     return design_page(title, suspension.source, verification.checks, sections, method)

@@ -48,8 +48,7 @@ def _as_list(values: Any) -> list[Any]:
     return list(values) if several else [values]
 
 
-def _file_names(values: Any) -> list[str]:
-    return [str(value) for value in _as_list(values)]
+FileNames = Annotated[list[str], BeforeValidator(lambda values: [*map(str, _as_list(values))])]
 
 
 def _texts(key: str, values: Any) -> list[str]:
@@ -111,8 +110,8 @@ class StudySpec(BaseModel):
     purpose: str | None = None  # likewise
     folder: str = "."  # that relative file names refer to, from the folder of the study
     scenario: str | None = None  # of a campaign, which has tracks and speeds of its own
-    vehicles: Annotated[list[str], BeforeValidator(_file_names)]
-    tracks: Annotated[list[str], BeforeValidator(_file_names)]
+    vehicles: FileNames
+    tracks: FileNames
     speeds: Annotated[list[float | str | None], BeforeValidator(_speeds)]
     grid: Annotated[dict[str, list[str]], BeforeValidator(_table)] = {}
     linked: list[Annotated[dict[str, list[str]], BeforeValidator(_linked_texts)]] = []
