@@ -41,8 +41,8 @@ BY_SIGN = ("dQ_over_Q0",)
 class Peak:
     """An extreme value over time and over all wheels, bodies or sensors of a quantity.
 
-    `smooth`: The same extreme value of the quantity after a low pass of `LOW_PASS`; NaN where it is
-    not known: outputs too seldom, or not at equal times [SI].
+    `smooth`: The same extreme value of the quantity after a low pass of `LOW_PASS`; None where it
+    is not known: outputs too seldom, or not at equal times [SI].
     """
 
     quantity: Quantity
@@ -51,7 +51,7 @@ class Peak:
     time: float  # [s]
     distance: float  # of the reference body at that time [m]
     kind: str = "abs"  # largest magnitude; or "max", "min": largest or smallest value
-    smooth: float = math.nan
+    smooth: float | None = None
 
     @property
     def shown(self) -> float:
@@ -63,7 +63,7 @@ class Peak:
         return {
             "quantity": self.quantity.name, "kind": self.kind, "value": self.value,
             "unit": self.quantity.unit, **self.labels, "time": self.time, "distance": self.distance,
-            **({} if math.isnan(self.smooth) else {"low_pass_20_hz": self.smooth}),
+            **({} if self.smooth is None else {"low_pass_20_hz": self.smooth}),
         }  # fmt: skip
 
 

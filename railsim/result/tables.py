@@ -1,7 +1,6 @@
 """Tables of a result: its peaks, and its values in full curves."""
 
 from collections.abc import Sequence
-from math import isnan
 
 from railsim.notation import Quantity
 from railsim.result.data import Result
@@ -22,7 +21,7 @@ def peak_table(result: Result) -> Table:
         text = f"{peak.quantity.words}{KINDS[peak.kind]}"
         name = peak.labels.get("wheelset", "")
         wheelset = f"{result.wheelsets.index(name) + 1} {name}" if name else ""
-        smooth = None if isnan(peak.smooth) else Amount(peak.smooth, column)
+        smooth = None if peak.smooth is None else Amount(peak.smooth, column)
         cells = wheelset, peak.labels.get("side", ""), Amount(peak.value, column)
         rows.append([peak.quantity.name, text, *cells, smooth, peak.time, peak.distance])
     heads = Column("quantity", "Peaks"), Column("words", "largest magnitude")
