@@ -182,7 +182,7 @@ def test_mirrored_actuators_answer_a_command_with_the_mirrored_force(acts, turne
         Vehicle.model_validate(image.model_dump()),
     ):
         (flat,) = (element for element in flatten(one).elements if element.name == "act")
-        assert flat.definition.rows()[0].sense == (-1.0 if turned else 1.0)
+        assert next(flat.definition.rows()).sense == (-1.0 if turned else 1.0)
     assert flatten(mirrored_vehicle(image)) == flatten(vehicle)
     line = {**act, "point": None, "points": [[9.5, 0.0, -0.9], [9.5, 0.3, -0.9]]}
     with pytest.raises(InputError, match="has no 'against_axis'"):

@@ -1,5 +1,6 @@
 """Forces that follow a command or a law of one's own."""
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field
@@ -96,9 +97,9 @@ class Actuator(CommandedElement):
         linear = {"damper": "N s/m", "position": "m"}.get(self.command, "N")
         return turning if self.acts in ("roll", "pitch", "yaw", "axle") else linear
 
-    def rows(self) -> list[Act]:
+    def rows(self) -> Iterator[Act]:
         """One actuator."""
-        return [self.act(mode=self.command, stiffness=self.stiffness, damping=self.damping)]
+        yield self.act(mode=self.command, stiffness=self.stiffness, damping=self.damping)
 
 
 class LawElement(CommandedElement):
@@ -110,6 +111,6 @@ class LawElement(CommandedElement):
     parameters: dict[Name, Finite] = EMPTY_TABLE
     """Values of the function's further arguments, by name"""
 
-    def rows(self) -> list[Act]:
+    def rows(self) -> Iterator[Act]:
         """One element with a law."""
-        return [self.act(mode="law", law=self.law, parameters=dict(self.parameters))]
+        yield self.act(mode="law", law=self.law, parameters=dict(self.parameters))

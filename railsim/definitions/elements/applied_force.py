@@ -1,5 +1,6 @@
 """A given force and torque on one body."""
 
+from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
 from pydantic import Field
@@ -41,27 +42,20 @@ class AppliedForce(Element):
         """Return the load in a mirrored placement; a torque turns opposite to a force."""
         handed = signs[0] * signs[1] * signs[2]
         turns = (handed * signs[0], handed * signs[1], handed * signs[2])
-        tables = {
-            "force_table": (self.force_table, signs),
-            "torque_table": (self.torque_table, turns),
-        }
         update = {
             key: tuple((row[0], *times(row[1:], factors)) for row in rows)
-            for key, (rows, factors) in tables.items()
-            if rows is not None
+            for key, factors in (("force_table", signs), ("torque_table", turns))
+            if (rows := getattr(self, key)) is not None
         }
         return self.model_copy(update=update)
 
-    def rows(self) -> list[Load]:
+    def rows(self) -> Iterator[Load]:
         """One load for the forces, one for the torques."""
-        tables = ((False, self.force_table), (True, self.torque_table))
-        return [
-            Load(
-                table=table,
-                is_torque=is_torque,
-                track_axes=self.axes == "track",
-                over_distance=self.over == "distance",
-            )
-            for is_torque, table in tables
-            if table is not None
-        ]
+        for is_torque, table in ((False, self.force_table), (True, self.torque_table)):
+            if table is not None:
+                yield Load(
+                    table=table,
+                    is_torque=is_torque,
+                    track_axes=self.axes == "track",
+                    over_distance=self.over == "distance",
+                )

@@ -1,7 +1,7 @@
 """What all force elements of a vehicle file have in common: bodies, points, sides, preloads."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
@@ -69,7 +69,7 @@ class Element(base.Definition):
     """Names of the bodies, found from the innermost assembly outwards"""
 
     @abstractmethod
-    def rows(self) -> Sequence[Row]:
+    def rows(self) -> Iterable[Row]:
         """Return what it becomes in the arrays of the model."""
 
     def end_points(self) -> tuple[base.Vector, base.Vector] | None:

@@ -1,5 +1,6 @@
 """Dry friction: pads, leaf springs, side bearers, centre plates, wedges."""
 
+from collections.abc import Iterator
 from math import cos, pi, sin, sqrt, tan
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -86,18 +87,14 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
         """Force of the second stage over the travel of body 2."""
         return self.stage_table
 
-    def rows(self) -> list[Mount]:
+    def rows(self) -> Iterator[Mount]:
         """One mount with pads along the axes that have friction."""
         pairs = zip(self.friction_force, self.friction_coefficient, strict=True)
         x, y, z = (self.limit(force, coefficient) for force, coefficient in pairs)
         together = self.friction_limit == "circle"
-        return [
-            self.mount(
-                friction=(x, y, z),
-                states=pads(self.stick_stiffness, (x, y, z), together=together),
-                tables=(None, None, self.stage_table),
-            )
-        ]
+        states = pads(self.stick_stiffness, (x, y, z), together=together)
+        tables = (None, None, self.stage_table)
+        yield self.mount(friction=(x, y, z), states=states, tables=tables)
 
 
 class SideBearer(SlidingFriction, PointElement):
@@ -151,22 +148,20 @@ class SideBearer(SlidingFriction, PointElement):
         first = self.stop_travel + self.clearance
         return ((-1.0, 0.0), (first, 0.0), (first + 1.0, self.stop_stiffness))
 
-    def rows(self) -> list[Mount]:
+    def rows(self) -> Iterator[Mount]:
         """One mount that presses, with pads in the plane and a table for the solid stop."""
         sliding = self.limit(0.0, self.friction_coefficient)
         friction = (sliding, sliding, self.limit())
         load = -self.stiffness * self.clearance if self.preload == 0.0 else self.preload
-        return [
-            Mount(
-                stiffness=(0.0, 0.0, self.stiffness),
-                damping=(0.0, 0.0, self.damping),
-                friction=friction,
-                states=pads((self.stick_stiffness, self.stick_stiffness, 0.0), friction),
-                tables=(None, None, self.stop_table),
-                one_sided=True,
-                preload=NOTHING if load == "auto" else (0.0, 0.0, load),
-            )
-        ]
+        yield Mount(
+            stiffness=(0.0, 0.0, self.stiffness),
+            damping=(0.0, 0.0, self.damping),
+            friction=friction,
+            states=pads((self.stick_stiffness, self.stick_stiffness, 0.0), friction),
+            tables=(None, None, self.stop_table),
+            one_sided=True,
+            preload=NOTHING if load == "auto" else (0.0, 0.0, load),
+        )
 
 
 class CentrePlate(SlidingFriction, PairElement):
@@ -226,9 +221,9 @@ class CentrePlate(SlidingFriction, PairElement):
                 pads.append((f"pad_{4 * ring + quarter + 1}", offset, pad))
         return pads
 
-    def rows(self) -> list[Mount]:
+    def rows(self) -> Iterator[Mount]:
         """None of its own: its pads stand in the arrays."""
-        return []
+        yield from ()
 
 
 def _gauss_on_ring(inner: float, outer: float) -> list[tuple[float, float]]:
@@ -305,14 +300,9 @@ class Wedge(VerticalSpring, PointElement):
         """Friction over spring force while the wedge slides level: mu/tan(angle)."""
         return self.friction_coefficient / tan(self.angle)
 
-    def rows(self) -> list[Mount]:
+    def rows(self) -> Iterator[Mount]:
         """One mount that presses, with skew pads along y and z."""
         sliding = FrictionLimit(coefficient=self.share)
         friction = (FrictionLimit(), sliding, sliding)
-        return [
-            self.mount(
-                friction=friction,
-                states=pads((0.0, *self.stick_stiffness), friction, skew=self.share),
-                one_sided=True,
-            )
-        ]
+        states = pads((0.0, *self.stick_stiffness), friction, skew=self.share)
+        yield self.mount(friction=friction, states=states, one_sided=True)

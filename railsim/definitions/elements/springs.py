@@ -1,5 +1,6 @@
 """Springs, dampers, stops and air springs."""
 
+from collections.abc import Iterator
 from itertools import pairwise
 from math import dist
 from typing import ClassVar, Literal, Self
@@ -72,7 +73,7 @@ class SpringDamper(base.FreeLength, base.SidedElement):
         """Damping along its line [N s/m]."""
         return self.damping if self.series_stiffness == 0.0 else 0.0
 
-    def rows(self) -> list[Link]:
+    def rows(self) -> Iterator[Link]:
         """One link; behind a spring in series the damper's force is an internal state."""
         state = None
         damps = self.damping > 0.0 or self.damper_table is not None
@@ -80,16 +81,14 @@ class SpringDamper(base.FreeLength, base.SidedElement):
             parameter = (self.damping, self.series_stiffness, 0.0)
             table = self.damper_table
             state = State("maxwell_curve" if table else "maxwell", parameter, table)
-        return [
-            Link(
-                stiffness=self.stiffness,
-                damping=0.0 if state else self.damping,
-                preload=0.0 if self.preload == "auto" else self.preload,
-                state=state,
-                spring_table=self.spring_table,
-                damper_table=None if state else self.damper_table,
-            )
-        ]
+        yield Link(
+            stiffness=self.stiffness,
+            damping=0.0 if state else self.damping,
+            preload=0.0 if self.preload == "auto" else self.preload,
+            state=state,
+            spring_table=self.spring_table,
+            damper_table=None if state else self.damper_table,
+        )
 
 
 class Bushing(base.VerticalSpring, base.PointElement):
@@ -121,19 +120,17 @@ class Bushing(base.VerticalSpring, base.PointElement):
         """Damping along z [N s/m]."""
         return self.damping[2] if self.series_stiffness[2] == 0.0 else 0.0
 
-    def rows(self) -> list[Mount]:
+    def rows(self) -> Iterator[Mount]:
         """One mount with a Maxwell state for each damper behind a spring."""
         pairs = list(zip(self.damping, self.series_stiffness, strict=True))
         x, y, z = (State("maxwell", (c, k, 0.0)) if min(c, k) > 0.0 else None for c, k in pairs)
         cx, cy, cz = (c if k == 0.0 else 0.0 for c, k in pairs)
-        return [
-            self.mount(
-                damping=(cx, cy, cz),
-                states=(x, y, z),
-                rotation=self.rotational_stiffness,
-                rotation_damping=self.rotational_damping,
-            )
-        ]
+        yield self.mount(
+            damping=(cx, cy, cz),
+            states=(x, y, z),
+            rotation=self.rotational_stiffness,
+            rotation_damping=self.rotational_damping,
+        )
 
 
 class ShearSpring(base.VerticalSpring, base.SidedElement):
@@ -157,11 +154,10 @@ class ShearSpring(base.VerticalSpring, base.SidedElement):
     """Air spring with levelling valve: what stands on such springs alone keeps its height in
     every load case"""
 
-    def rows(self) -> list[Mount]:
+    def rows(self) -> Iterator[Mount]:
         """One mount in the middle between the seats, in the axes of both bodies."""
-        return [
-            self.mount(rotation=(*self.bending_stiffness, self.torsional_stiffness), both_ends=True)
-        ]
+        rotation = (*self.bending_stiffness, self.torsional_stiffness)
+        yield self.mount(rotation=rotation, both_ends=True)
 
 
 class Airspring(base.PreloadAlongAxes, base.PointElement):
@@ -202,19 +198,17 @@ class Airspring(base.PreloadAlongAxes, base.PointElement):
         in_series = self.bellows_stiffness * self.reservoir_stiffness
         return self.area_stiffness + in_series / (self.bellows_stiffness + self.reservoir_stiffness)
 
-    def rows(self) -> list[Mount]:
+    def rows(self) -> Iterator[Mount]:
         """One mount in the middle, its vertical force with the state of the reservoir."""
         air = (self.bellows_stiffness, self.reservoir_stiffness, self.orifice_damping)
-        return [
-            Mount(
-                stiffness=(*self.horizontal_stiffness, self.area_stiffness),
-                damping=(*self.horizontal_damping, 0.0),
-                states=(None, None, State("air", air)),
-                rotation=(0.0, 0.0, self.torsional_stiffness),
-                preload=self.known_preload,
-                both_ends=True,
-            )
-        ]
+        yield Mount(
+            stiffness=(*self.horizontal_stiffness, self.area_stiffness),
+            damping=(*self.horizontal_damping, 0.0),
+            states=(None, None, State("air", air)),
+            rotation=(0.0, 0.0, self.torsional_stiffness),
+            preload=self.known_preload,
+            both_ends=True,
+        )
 
 
 class BumpStop(base.PointElement):
@@ -233,10 +227,10 @@ class BumpStop(base.PointElement):
         turned = tuple((-x, -force) for x, force in reversed(self.table))
         return self.model_copy(update={"table": turned})
 
-    def rows(self) -> list[Mount]:
+    def rows(self) -> Iterator[Mount]:
         """One mount with a table along its axis."""
         x, y, z = (self.table if axis == self.axis else None for axis in "xyz")
-        return [Mount(tables=(x, y, z))]
+        yield Mount(tables=(x, y, z))
 
 
 class RollBar(base.PairElement):
@@ -248,12 +242,10 @@ class RollBar(base.PairElement):
     damping: NonNegative = 0.0
     """Roll damping [N m s/rad]"""
 
-    def rows(self) -> list[Mount]:
+    def rows(self) -> Iterator[Mount]:
         """One mount that turns only."""
-        return [
-            Mount(
-                rotation=(self.stiffness, 0.0, 0.0),
-                rotation_damping=(self.damping, 0.0, 0.0),
-                translates=False,
-            )
-        ]
+        yield Mount(
+            rotation=(self.stiffness, 0.0, 0.0),
+            rotation_damping=(self.damping, 0.0, 0.0),
+            translates=False,
+        )

@@ -1,5 +1,6 @@
 """Torques on wheelsets: drives and brakes."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
@@ -40,17 +41,15 @@ class AxleTorque(PairElement):
         if self.slip_control is not None and not self.slip_control[0] < self.slip_control[1] <= 1.0:
             raise ValueError("'slip_control' needs two rising slips up to 1, such as [0.01, 0.02]")
 
-    def rows(self) -> list[Drive]:
+    def rows(self) -> Iterator[Drive]:
         """One drive."""
-        return [
-            Drive(
-                torque_table=self.torque_table,
-                demand_table=self.demand_table,
-                slip_control=self.slip_control,
-                brakes=self.BRAKES,
-                over_distance=self.over == "distance",
-            )
-        ]
+        yield Drive(
+            torque_table=self.torque_table,
+            demand_table=self.demand_table,
+            slip_control=self.slip_control,
+            brakes=self.BRAKES,
+            over_distance=self.over == "distance",
+        )
 
 
 class Traction(AxleTorque):
