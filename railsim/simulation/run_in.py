@@ -238,7 +238,7 @@ def _way_from_constant(
     for distances in (ways[:1], ways):  # most runs begin where nothing changes
         s = start - distances[:, None] + under
         changes = [
-            alignment.curvature_rate(s),
+            alignment.curvature.rate(s),
             alignment.cant_angle_rate(s),
             alignment.grade_angle_rate(s),
         ]

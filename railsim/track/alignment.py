@@ -29,7 +29,12 @@ from railsim.errors import Fault, InputError
 class Alignment:
     """Geometry of a track's centre line and track plane over arc length.
 
-    Every method takes arc lengths of any shape [m] and returns an array of that shape.
+    Everything takes arc lengths of any shape [m] and returns an array of that shape; see
+    `RoundedProfile` for rates and integrals.
+
+    - `curvature`: kappa, positive to the right [1/m]; `heading`: psi, its integral [rad]
+    - `cant`: height of the left rail over the right one [m]
+    - `gradient`: of the vertical profile, rise over horizontal distance [1]
 
     `track`: the track; beyond its ends the end elements continue. Raises InputError: elements that
     do not fit together.
@@ -45,40 +50,21 @@ class Alignment:
             file = f"track '{track.name}'"
             raise InputError(Fault(file, f.key, f.found, f.allowed) for f in faults)
         self.length = track.length
-        self._curvature = RoundedProfile(layout.curvature_sections(track), track.rounding)
+        self.curvature = RoundedProfile(layout.curvature_sections(track), track.rounding)
+        self.heading = self.curvature.integral
         cant = layout.cant_sections(track)
-        self._cant = RoundedProfile(cant, track.rounding)
-        self._gradient = RoundedProfile(layout.gradient_sections(track), track.rounding)
+        self.cant = RoundedProfile(cant, track.rounding)
+        self.gradient = RoundedProfile(layout.gradient_sections(track), track.rounding)
         rising = _magnitudes(cant) if track.cant_rotation == "inner_rail" else []
         self._lifting_cant = RoundedProfile(rising, track.rounding)
 
-    def curvature(self, s: ArrayLike) -> Floats:
-        """Curvature kappa, positive to the right [1/m]."""
-        return self._curvature(s)
-
-    def curvature_rate(self, s: ArrayLike) -> Floats:
-        """Derivative of the curvature along the track [1/m2]."""
-        return self._curvature.rate(s)
-
-    def heading(self, s: ArrayLike) -> Floats:
-        """Heading psi, positive to the right [rad]."""
-        return self._curvature.integral(s)
-
-    def cant(self, s: ArrayLike) -> Floats:
-        """Cant: height of the left rail over the right one [m]."""
-        return self._cant(s)
-
     def cant_angle(self, s: ArrayLike) -> Floats:
         """Cant angle phi = asin(cant / 1.5 m), positive = left rail higher [rad]."""
-        return np.arcsin(self._cant(s) / CANT_BASE)
+        return np.arcsin(self.cant(s) / CANT_BASE)
 
     def cant_angle_rate(self, s: ArrayLike) -> Floats:
         """Derivative of the cant angle along the track [rad/m]."""
-        return self._cant.rate(s) / (CANT_BASE * np.sqrt(1.0 - (self._cant(s) / CANT_BASE) ** 2))
-
-    def gradient(self, s: ArrayLike) -> Floats:
-        """Gradient of the vertical profile, rise over horizontal distance [1]."""
-        return self._gradient(s)
+        return self.cant.rate(s) / (CANT_BASE * np.sqrt(1.0 - (self.cant(s) / CANT_BASE) ** 2))
 
     def grade_angle(self, s: ArrayLike) -> Floats:
         """Grade angle theta of the centre line, positive = nose up [rad].
@@ -89,12 +75,12 @@ class Alignment:
 
     def grade_angle_rate(self, s: ArrayLike) -> Floats:
         """Derivative of the grade angle along the track [rad/m]."""
-        climb_rate = self._gradient.rate(s) / (1.0 + self._gradient(s) ** 2) ** 1.5
+        climb_rate = self.gradient.rate(s) / (1.0 + self.gradient(s) ** 2) ** 1.5
         climb_rate += 0.5 * self._lifting_cant.second_rate(s)
         return climb_rate / np.sqrt(1.0 - self._climb(s) ** 2)
 
     def _climb(self, s: ArrayLike) -> Floats:
-        gradient = self._gradient(s)
+        gradient = self.gradient(s)
         return gradient / np.sqrt(1.0 + gradient**2) + 0.5 * self._lifting_cant.rate(s)
 
 

@@ -133,7 +133,8 @@ def test_rates_are_the_derivatives(name):
         {"type": "CST", "length": 100.0, "gradient": 0.02},
     ]
     alignment = Alignment(curve(vertical=vertical, cant_rotation="inner_rail"))
-    rate = alignment.curvature if name == "heading" else getattr(alignment, f"{name}_rate")
+    profile = {"heading": alignment.curvature, "curvature": alignment.curvature.rate}
+    rate = profile.get(name) or getattr(alignment, f"{name}_rate")
     s, h = np.linspace(-20.0, 320.0, 331) + 0.013, 1e-4
     value = getattr(alignment, name)
     difference = (value(s + h) - value(s - h)) / (2.0 * h)
