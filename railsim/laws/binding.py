@@ -24,7 +24,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.vehicle.laws import Law
-from railsim.errors import InputError, input_error
+from railsim.errors import InputError, input_error, nearest
 from railsim.laws.permission import check_laws
 
 MEMORY = "memory"
@@ -110,6 +110,21 @@ def bind(name: str, law: Law, takes: Takes, gives: int | None = None, memory: in
     """
     check_laws([(name, law)])
     return _bound(name, law, takes, gives, memory)
+
+
+def bind_use(
+    file: str, key: str, use: Any, laws: Mapping[str, Law] | None, takes: Takes
+) -> tuple[Bound, list[float]]:
+    """Compile the law that a key of a file uses, with the values of its parameters.
+
+    `use`: has the name `law` of one of the `laws`, and `parameters`. Raises InputError: there is no
+    such law; see `bind` for the others.
+    """
+    if use.law not in (laws := laws or {}):
+        allowed = nearest(use.law, laws) if laws else "there is none"
+        raise input_error(file, f"no law '{use.law}'", allowed, key=f"{key}.law")
+    bound = bind(use.law, laws[use.law], takes)
+    return bound, bound.parameters(f"{key}.parameters", use.parameters)
 
 
 @cache

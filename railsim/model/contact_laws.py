@@ -4,13 +4,12 @@ import numpy as np
 
 from railsim.contact.creep import creep_law
 from railsim.definitions import Settings, Track
-from railsim.definitions.vehicle.laws import LawUse
-from railsim.errors import input_error, nearest
+from railsim.errors import input_error
 from railsim.kernels.creep import USER
 from railsim.kernels.patches import CreepLaw
 from railsim.kernels.system import Contact
 from railsim.kernels.user_laws import CREEP_INPUTS, CREEP_RESULTS, FRICTION_INPUTS, FRICTION_RESULTS
-from railsim.laws.binding import CREEP_LAW, FRICTION_LAW, Bound, Takes, bind
+from railsim.laws.binding import CREEP_LAW, FRICTION_LAW, bind_use
 
 
 def settings_creep_law(settings: Settings, track: Track) -> CreepLaw:
@@ -34,22 +33,13 @@ def with_own_laws(contact: Contact, settings: Settings) -> Contact:
 
     Raises InputError: A name that means nothing; a law that is not permitted or cannot be compiled.
     """
-    if settings.own_creep_law is not None:
-        bound, values = _bound(settings, settings.own_creep_law, "own_creep_law", CREEP_LAW)
+    if (use := settings.own_creep_law) is not None:
+        bound, values = bind_use("settings", "own_creep_law", use, settings.laws, CREEP_LAW)
         block = np.array([0.0] * (CREEP_RESULTS + CREEP_INPUTS) + values)
         law = contact.law._replace(number=USER, user_law=bound.address, block=block)
         contact = contact._replace(law=law)
-    if settings.own_friction is not None:
-        bound, values = _bound(settings, settings.own_friction, "own_friction", FRICTION_LAW)
+    if (use := settings.own_friction) is not None:
+        bound, values = bind_use("settings", "own_friction", use, settings.laws, FRICTION_LAW)
         block = np.array([0.0] * (FRICTION_RESULTS + FRICTION_INPUTS) + values)
         contact = contact._replace(friction_law=bound.address, friction_block=block)
     return contact
-
-
-def _bound(settings: Settings, use: LawUse, key: str, takes: Takes) -> tuple[Bound, list[float]]:
-    laws = settings.laws or {}
-    if use.law not in laws:
-        allowed = nearest(use.law, laws) if laws else "there is none"
-        raise input_error("settings", f"no law '{use.law}'", allowed, key=f"{key}.law")
-    bound = bind(use.law, laws[use.law], takes)
-    return bound, bound.parameters(f"{key}.parameters", use.parameters)

@@ -31,14 +31,13 @@ from railsim.definitions.elements.rows import (
 )
 from railsim.definitions.vehicle.flatten import FlatBody, FlatElement
 from railsim.definitions.vehicle.laws import Law
-from railsim.errors import input_error, nearest
 from railsim.kernels import actuators as acts
 from railsim.kernels import element_columns as layout
 from railsim.kernels.alignment import aligned_zeros
 from railsim.kernels.control_records import Actuators, UserLaws
 from railsim.kernels.internal import AIR, LAG, MAXWELL, MAXWELL_CURVE, PAD, USER, Internal
 from railsim.kernels.system import Curves, Drives, Links, Loads, Mounts
-from railsim.laws.binding import FORCE_ELEMENT, Bound, bind
+from railsim.laws.binding import FORCE_ELEMENT, Bound, bind_use
 
 LAWS = {"maxwell": MAXWELL, "maxwell_curve": MAXWELL_CURVE, "pad": PAD, "air": AIR}
 LAWS |= {"lag": LAG, "own": USER}
@@ -89,12 +88,7 @@ class LawBlocks:
 
     def element_law(self, name: str, act: Act) -> tuple[int, int, int]:
         """Number of a law, place of its block and number of its states."""
-        laws = self.laws or {}
-        if act.law not in laws:
-            found, allowed = f"no law '{act.law}'", nearest(act.law, laws) if laws else "none"
-            raise input_error("vehicle", found, allowed, key=f"elements.{name}.law")
-        bound = bind(act.law, laws[act.law], FORCE_ELEMENT)
-        values = bound.parameters(f"elements.{name}.parameters", act.parameters)
+        bound, values = bind_use("vehicle", f"elements.{name}", act, self.laws, FORCE_ELEMENT)
         block = [0.0] * (1 + bound.states + acts.LAW_INPUTS + bound.states)
         return self.law(bound), self.room([*block, *values]), bound.states
 

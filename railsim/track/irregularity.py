@@ -17,8 +17,8 @@ from railsim.definitions.excitations.single import Single
 from railsim.definitions.track.elements import Section
 from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.track.rounded_profile import RoundedProfile
-from railsim.errors import input_error, nearest
-from railsim.laws.binding import EXCITATION, bind
+from railsim.errors import input_error
+from railsim.laws.binding import EXCITATION, bind_use
 from railsim.laws.permission import permitted_part
 
 # Largest displacement between the rows over that at the rows, from which on it is remarked on.
@@ -61,12 +61,7 @@ def displacement(track: Track) -> Displacement | None:
 
 def _by_law(part: ByLaw, key: str, track: Track) -> Displacement:
     """Return what a law of one's own gives; InputError where it is not permitted or not finite."""
-    laws = track.laws or {}
-    if part.law not in laws:
-        allowed = nearest(part.law, laws) if laws else "there is none"
-        raise input_error("track", f"no law '{part.law}'", allowed, key=f"{key}.law")
-    bound = bind(part.law, laws[part.law], EXCITATION)
-    values = bound.parameters(f"{key}.parameters", part.parameters)
+    bound, values = bind_use("track", key, part, track.laws, EXCITATION)
 
     def value(s: Floats) -> Floats:
         found: Floats = bound.values(s[:, None], values)
