@@ -107,13 +107,17 @@ AutoOrNumber = Annotated[_Auto | Annotated[Finite, Tag("value")], Discriminator(
 AutoOrVector = Annotated[_Auto | Annotated[Vector, Tag("value")], Discriminator(_word_or_value)]
 
 
+def _refuse(*_: object, **__: object) -> NoReturn:
+    raise TypeError("a definition does not change; with_values() and replace() return new ones")
+
+
 class FrozenDict(dict[Any, Any]):
     """A dictionary that does not change: two definitions may share it, and keep what follows."""
 
-    def _refuse(self, *_: object, **__: object) -> NoReturn:
-        raise TypeError("a definition does not change; with_values() and replace() return new ones")
-
     __setitem__ = __delitem__ = clear = pop = popitem = setdefault = update = __ior__ = _refuse
+
+    def __hash__(self) -> int:  # type: ignore[override]  # definitions are keys of dictionaries
+        return hash(frozenset(self.items()))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return FrozenDict, (dict(self),)
@@ -138,6 +142,8 @@ class Definition(BaseModel):
 
     # built when first used: a part of a vehicle is built as part of it, not once more by itself
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    __setattr__ = __delattr__ = _refuse
 
     def model_post_init(self, _: Any) -> None:
         """Keep the tables of a definition from being changed."""

@@ -24,12 +24,12 @@ from railsim.text import LONGEST_FILE, shortened
 __all__ = ["Profile", "load_profile", "profile_text", "save_profile"]
 
 
-def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
+def load_profile(name_or_path: str | Path, kind: Kind | None = None) -> Profile:
     """Profile by its built-in name or from a file.
 
     Parameters
     ----------
-    name_or_path : str
+    name_or_path : str or Path
         Path of a file (CSV, SIMPACK ``.prw``/``.prr``, MiniProf ``.whl``/``.ban``) or name of a
         built-in profile; a file wins over a name.
     kind : "wheel", "rail" or None
@@ -50,27 +50,26 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
     >>> load_profile("S1002").kind
     'wheel'
     """
-    path = Path(name_or_path)
-    if name_or_path in DEFINITIONS and not is_file(path):
-        profile = builtin_profile(name_or_path)
+    name = str(name_or_path)
+    path = Path(name)
+    if name in DEFINITIONS and not is_file(path):
+        profile = builtin_profile(name)
     elif path.suffix or is_file(path):
         # reading is rare and needs scipy: not imported for built-in profiles
         from railsim.profiles.readers import read_profile_file
         from railsim.profiles.recognition import recognised_profile
 
         points = read_profile_file(path)
-        points.file = str(name_or_path)
+        points.file = name
         return recognised_profile(points, kind)
     else:
         raise input_error(
-            shortened(name_or_path, LONGEST_FILE),
+            shortened(name, LONGEST_FILE),
             "no such profile",
-            nearest(name_or_path, DEFINITIONS) + " or the path of a file",
+            nearest(name, DEFINITIONS) + " or the path of a file",
         )
     if kind is not None and profile.kind != kind:
-        raise input_error(
-            name_or_path, f"this is a {profile.kind} profile", f"give a {kind} profile"
-        )
+        raise input_error(name, f"this is a {profile.kind} profile", f"give a {kind} profile")
     return profile
 
 

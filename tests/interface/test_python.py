@@ -341,12 +341,23 @@ def test_definitions_and_results_cannot_be_changed(coach, result):
         coach.bodies["carbody"] = None
     with pytest.raises(TypeError, match="does not change"):
         coach.assemblies.clear()
+    with pytest.raises(TypeError, match="does not change"):
+        coach.bodies["carbody"].mass = 28e3
+    with pytest.raises(TypeError, match="does not change"):
+        del coach.name
     assert pickle.loads(pickle.dumps(coach)) == coach == copy.deepcopy(coach)
     assert pickle.loads(pickle.dumps(coach)).bodies.keys() == coach.bodies.keys()
     with pytest.raises(TypeError, match="does not change"):
         pickle.loads(pickle.dumps(coach)).bodies.clear()
     with pytest.raises(ValueError, match="WRITEABLE"):
         result.Q.setflags(write=True)
+
+
+def test_definitions_are_keys_of_dictionaries(coach):
+    one, other = railsim.Settings(initial={"axle": {"y": 1e-3}}), railsim.Settings()
+    of = {coach: "coach", one: "one", other: "other"}
+    again = railsim.Settings(initial={"axle": {"y": 1e-3}})
+    assert (of[pickle.loads(pickle.dumps(coach))], of[again]) == ("coach", "one")
 
 
 def test_what_follows_from_a_vehicle_is_worked_out_once_in_a_process(coach):

@@ -1,6 +1,7 @@
 """Built-in profiles and profile files: what is recognised, put right and refused."""
 
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -509,3 +510,10 @@ def test_profiles_compare_by_their_points():
     assert hash(one) == hash(Profile("S1002", "wheel", one.y, one.z))
     with pytest.raises(ValueError, match="read-only"):
         one.y[0] = 0.0
+
+
+def test_a_profile_may_be_given_as_a_path(tmp_path):
+    assert load_profile(Path("S1002")) == load_profile("S1002")
+    for missing in (tmp_path / "none", None):
+        with pytest.raises(InputError, match="no such profile"):
+            load_profile(missing)
