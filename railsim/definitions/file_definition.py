@@ -14,7 +14,7 @@ from railsim.definitions.base import Definition, Remark, once
 from railsim.definitions.faults import validation_faults
 from railsim.errors import Fault, InputError
 from railsim.files.access import check_file, write_text
-from railsim.files.overrides import apply_overrides, with_values
+from railsim.files.overrides import apply_overrides, plain, with_values
 from railsim.files.sources import Source, text_source
 from railsim.table import Table
 from railsim.text import printable, shortened
@@ -36,6 +36,7 @@ class FileDefinition(Definition):
 
     def __init__(self, /, **values: Any) -> None:
         """Check the values; raises InputError: everything that is wrong in them."""
+        values = plain(values)  # as those of a file, so that faults are located alike
         try:
             super().__init__(**values)
         except ValidationError as error:
@@ -177,7 +178,7 @@ def loaded(model: type[D], source: Source, overrides: Iterable[str] | str) -> D:
     if source.data.get("format") != model.format_name():
         file = source.file_of(("format",))
         raise InputError([format_fault(file, source.data.get("format"), [model.format_name()])])
-    overrides = [overrides] if isinstance(overrides, str) else list(overrides)
+    overrides = [overrides] if isinstance(overrides, str) else list(map(str, overrides))
     model.note_assigned(source.data, [text.partition("=")[0].strip() for text in overrides])
     return validated(model, apply_overrides(source, overrides, model.OPEN_TABLES, _defaults(model)))
 
@@ -200,7 +201,7 @@ def validated(model: type[D], source: Source) -> D:
     else:
         faults = faults or located(definition.contradictions())
     if faults:
-        raise InputError(dict.fromkeys(faults))
+        raise InputError(faults)
     return definition.settled()
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
+from pathlib import PurePath
 from typing import Any
 
 from railsim.errors import Faults
@@ -47,7 +48,7 @@ def with_values(
     """
     if not isinstance(values, Mapping):
         raise TypeError(f"the values are {values!r}; give keys with their values: {{'key': 1.0}}")
-    assignments = ((key, lambda _, value=value: _plain(value)) for key, value in values.items())
+    assignments = ((key, lambda _, value=value: plain(value)) for key, value in values.items())
     return _assign(source, assignments, free, defaults, source.file)
 
 
@@ -57,14 +58,18 @@ def _split(text: str) -> tuple[str, Read | None]:
     return key.strip(), partial(_value, text_value.strip()) if equals else None
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return what TOML would hold: lists for tuples and arrays, numbers for those of numpy."""
+    if type(value) is float:  # the most frequent, in long tables
+        return value
     if hasattr(value, "tolist"):
         return value.tolist()
+    if isinstance(value, PurePath):
+        return str(value)
     if isinstance(value, Mapping):
-        return {key: _plain(member) for key, member in value.items()}
+        return {key: plain(member) for key, member in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(member) for member in value]
+        return [plain(member) for member in value]
     return value
 
 

@@ -66,16 +66,20 @@ class Profile:
             values = np.array(getattr(self, name), dtype=np.float64)
             values.setflags(write=False)
             object.__setattr__(self, name, values)
+        at = f"profile '{self.name}'"
         if self.y.ndim != 1 or self.y.shape != self.z.shape or self.y.size < FEWEST_POINTS:
             found = f"arrays of shape {self.y.shape} and {self.z.shape}"
             allowed = f"two rows of equal length, {FEWEST_POINTS} points at least"
-            raise input_error(f"profile '{self.name}'", found, allowed, key="y, z")
+            raise input_error(at, found, allowed, key="y, z")
         if not np.isfinite([self.y, self.z]).all():
-            found = "values that are not finite"
-            raise input_error(f"profile '{self.name}'", found, "numbers in m", key="y, z")
+            raise input_error(at, "values that are not finite", "numbers in m", key="y, z")
         if self.kind not in get_args(Kind):
-            found = shortened(repr(self.kind))
-            raise input_error(f"profile '{self.name}'", found, "wheel or rail", key="kind")
+            raise input_error(at, shortened(repr(self.kind)), "wheel or rail", key="kind")
+        y, (top, bottom) = self.y[[0, -1]], (self.z.min(), self.z.max())
+        if y[0] >= y[1] or (top < -0.02 and bottom < 0.005):  # no flange, no side of a head
+            found = f"y from {y[0]:g} to {y[1]:g}, z {top:g} to {bottom:g}"
+            allowed = "y rises from the flange or gauge side to the field side, z points down"
+            raise input_error(at, found, allowed, key="y, z")
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Profile):

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
 
 import click
 import example_result
@@ -263,6 +264,22 @@ def test_a_wrong_argument_is_one_clear_error(given, words, coach):
     assert str(caught.value).startswith(words)
 
 
+def test_arrays_and_paths_are_values_as_in_a_file():
+    plan, rows = [{"type": "STR", "length": np.float32(50.0)}], np.zeros((2, 3))
+    make = partial(railsim.Track, format="railsim-track/1", name="own", plan=plan)
+    track = make(friction=np.array([0.3, 0.2]), rail=Path("54E1"))
+    assert (track.friction, track.rail) == ((0.3, 0.2), ("54E1", "54E1"))
+    with pytest.raises(InputError) as caught:
+        make(rail=3, irregularities=[{"type": "measured", "rows": rows}])
+    assert str(caught.value).splitlines() == [
+        "track: rail: 3; must be a valid string",
+        "track: irregularities.0.rows.0: 3 values; a list of 5",
+        "track: irregularities.0.rows.1: 3 values; a list of 5",
+    ]
+    with pytest.raises(InputError, match=r"an assignment .* is needed"):
+        railsim.load_track("straight", [("friction", 0.3)])
+
+
 def test_one_vehicle_at_least_and_a_sink_for_each_run_together(coach):
     track = railsim.load_track("straight")
     with pytest.raises(InputError, match="vehicles: no vehicle"):
@@ -327,6 +344,8 @@ def test_names_instead_of_what_they_stand_for_are_told(coach):
         ({"y": [0.0, 1.0, math.nan]}, "values that are not finite"),
         ({"y": [0.0, 1.0]}, "arrays of shape (2,) and (3,)"),
         ({"kind": "wheels"}, "'wheels'; wheel or rail"),
+        ({"y": [0.2, 0.1, 0.0]}, "y from 0.2 to 0, z 0 to 0; y rises from the flange or gauge"),
+        ({"z": [-0.01, -0.028, 0.003]}, "y from 0 to 0.2, z -0.028 to 0.003; y rises from"),
     ],
 )
 def test_points_that_are_no_profile_are_refused(changes, words):
