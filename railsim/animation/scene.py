@@ -18,6 +18,7 @@ from railsim.definitions.vehicle.outlines import body_boxes
 from railsim.errors import Fault, Faults, argument_error, input_error, nearest
 from railsim.notation import COMPONENTS
 from railsim.result import Result
+from railsim.result.data import check_result
 from railsim.track.alignment import Alignment
 from railsim.track.irregularity import shown_displacement
 
@@ -84,6 +85,7 @@ def result_scene(
     Distances of the reference body between which the run is shown [m]. Raises InputError: the
     result lacks something; nothing lies between.
     """
+    check_result(result)
     allowed = f"run it with settings.outputs.quantities with {', '.join(NEEDED)}"
     Faults(
         Fault("result", name, "is not in it", allowed) for name in NEEDED if name not in result

@@ -58,6 +58,8 @@ def describe(item: "FileDefinition | Result", speeds: Sequence[float | str] = ()
 
 def _result(result: "Result") -> Description:
     """Return what a result holds, without its arrays."""
+    if not hasattr(result, "attributes"):
+        raise TypeError(f"found {result!r}; give what railsim.load_... or open_result returns")
     inputs = ("vehicle_toml", "track_toml", "settings_json")
     attributes = {k: v for k, v in result.attributes.items() if k not in (*inputs, "remarks")}
     coordinates = {name: list(labels) for name, labels in result.coordinates.items()}

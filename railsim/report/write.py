@@ -1,6 +1,6 @@
 """One page about result files, folders of studies, comparisons with tests and wear."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from railsim.assessment.assessment import Assessment
@@ -60,7 +60,7 @@ def write_report(
     >>> railsim.write_report("curves", "curves.html")  # doctest: +SKIP
     """
     target = Path(path)
-    each = list(files) if isinstance(files, Iterable) and not isinstance(files, str) else [files]
+    each = list(files) if isinstance(files, Sequence) and not isinstance(files, str) else [files]
     faults = Faults()
     faults.require(each, "files", "none", "a result file or a folder at least")
     for file in each:

@@ -14,7 +14,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.track.elements import Section
 from railsim.definitions.track.layout import curvature_sections
 from railsim.notation import Quantity
-from railsim.result.data import Result
+from railsim.result.data import Result, check_result
 from railsim.result.filters import even_step, low_passed, outward_quotient
 
 FORCES = ("Q", "dQ_over_Q0", "Y", "Y_over_Q", "sum_Y", "sum_abs_Y")
@@ -147,6 +147,7 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
     `names`: Quantities; those of `PEAK_QUANTITIES` that the result has if not given. Returns: none
     where the run ended before its first instant was recorded.
     """
+    check_result(result)
     if not len(result["time"]):
         return ()
     cache: dict[str, Floats] = {}
@@ -210,6 +211,7 @@ def mid_curves(
     if not given. `track`: That of the result; by default it is rebuilt from the text that the
     result carries.
     """
+    check_result(result)
     chosen, distance = _quantity_names(result, names), result["distance"]
     if len(distance) < 2 or not distance[0] < distance[-1]:
         return ()

@@ -13,7 +13,7 @@ from railsim.simulation.run import simulate
 
 
 def simulate_together(
-    vehicles: Sequence[Vehicle],
+    vehicles: Sequence[Vehicle] | Vehicle,
     track: Track,
     *,
     sinks: Sequence[Sink] | None = None,
@@ -24,7 +24,7 @@ def simulate_together(
 
     Parameters
     ----------
-    vehicles : sequence of Vehicle
+    vehicles : sequence of Vehicle, or a single one
         Such as one vehicle with different parameters; they do not interact.
     track : Track
         Of all runs.
@@ -55,6 +55,7 @@ def simulate_together(
     >>> [result.status for result in results]
     ['complete', 'complete']
     """
+    vehicles = [vehicles] if isinstance(vehicles, Vehicle) else vehicles
     check_types(vehicles, track, settings=conditions.get("settings"))
     count = len(vehicles)
     if not vehicles or (sinks is not None and len(sinks) != count):

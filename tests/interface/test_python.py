@@ -297,6 +297,8 @@ def test_several_vehicles_over_one_track_are_runs_as_alone(coach):
     for vehicle, result in zip((coach, light), both, strict=True):
         alone = railsim.simulate(vehicle, track, speed=20.0, until=2.0)
         np.testing.assert_array_equal(result.Q, alone.Q)
+    (single,) = railsim.simulate_together(coach, track, speed=20.0, until=2.0)
+    np.testing.assert_array_equal(single.Q, both[0].Q)
     assert seen == sorted(seen)
     assert seen[-1] == 1.0
     assert 0.5 in seen
@@ -316,7 +318,7 @@ def test_a_vehicle_that_fails_fails_when_all_others_are_done(coach, tmp_path):
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["1.h5", "3.h5"]
 
 
-def test_names_instead_of_what_they_stand_for_are_told(coach):
+def test_names_instead_of_what_they_stand_for_are_told(coach, result):
     track = railsim.load_track("straight")
     curving = partial(railsim.curving, radius=300.0)
     for analysis in (railsim.modes, railsim.critical_speed, railsim.static_loads, curving):
@@ -332,6 +334,13 @@ def test_names_instead_of_what_they_stand_for_are_told(coach):
     for load in (railsim.load_vehicle, railsim.load_track, railsim.load_settings):
         with pytest.raises(TypeError, match="is a Vehicle; give a path"):
             load(coach)
+    for show in (railsim.peaks, railsim.mid_curves, partial(railsim.animate, path="a.html")):
+        with pytest.raises(TypeError, match="the result is 'run"):
+            show("run.h5")
+    with pytest.raises(TypeError, match=r"found 'coach'; give what railsim.load_... or open_resu"):
+        railsim.describe("coach")
+    with pytest.raises(InputError, match=r"files: found <Result: .*; the path of a result file"):
+        railsim.write_report(result, "page.html")
     with pytest.raises(TypeError, match="the track is 'straight'"):
         railsim.simulate(coach, "straight", speed=20.0)
     with pytest.raises(TypeError, match="profiles: give a mapping of names"):
