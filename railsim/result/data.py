@@ -41,9 +41,7 @@ Attributes = Mapping[str, str | float | int]
 def check_result(value: object) -> None:
     """Raise TypeError where something else than a result is given, such as the path of one."""
     if not isinstance(value, Result):
-        from railsim.definitions.vehicle.flatten import wrong_type
-
-        raise TypeError(wrong_type("result", value))
+        raise TypeError(f"the result is {value!r}; give what railsim.open_result returns")
 
 
 class Result:

@@ -147,14 +147,14 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
     `names`: Quantities; those of `PEAK_QUANTITIES` that the result has if not given. Returns: none
     where the run ended before its first instant was recorded.
     """
-    check_result(result)
+    chosen = _quantity_names(result, names)
     if not len(result["time"]):
         return ()
     cache: dict[str, Floats] = {}
     extremes: list[Peak] = []
     step = even_step(result["time"]) or math.inf
     often = step * LOW_PASS * LEAST_RATE <= 1.0
-    for name in _quantity_names(result, names):
+    for name in chosen:
         filtered = often and name in FORCES
         smooth = _smoothed(result, name, 1.0 / step, cache) if filtered else None
         for kind in ("max", "min") if name in BY_SIGN else ("abs",):
@@ -211,7 +211,6 @@ def mid_curves(
     if not given. `track`: That of the result; by default it is rebuilt from the text that the
     result carries.
     """
-    check_result(result)
     chosen, distance = _quantity_names(result, names), result["distance"]
     if len(distance) < 2 or not distance[0] < distance[-1]:
         return ()
@@ -224,6 +223,7 @@ def mid_curves(
 
 
 def _quantity_names(result: Result, names: Iterable[str] | None) -> list[str]:
+    check_result(result)
     return [n for n in PEAK_QUANTITIES if n in result] if names is None else list(names)
 
 

@@ -150,8 +150,7 @@ def wrong_type(kind: str, value: object) -> str:
     """Return what is wrong where a name or a file is given instead of what it stands for."""
     found = repr(value) if isinstance(value, str) else f"a {type(value).__name__}"
     verb = "are" if kind == "settings" else "is"
-    maker = "open_result" if kind == "result" else f"load_{kind}"
-    return f"the {kind} {verb} {found}; give what railsim.{maker} returns"
+    return f"the {kind} {verb} {found}; give what railsim.load_{kind} returns"
 
 
 def flatten(vehicle: "Vehicle") -> FlatVehicle:
