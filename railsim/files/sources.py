@@ -186,8 +186,8 @@ def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fa
         found = f"'{name}' is a shipped {other}"
     allowed = "a path"
     if kind in FOLDERS:
-        names = nearest(str(name), library_files(kind))
-        allowed = f"a path, or the name of a shipped {kind}: {names.removeprefix('allowed: ')}"
+        names = nearest(str(name), library_files(kind)).removeprefix("allowed: ")
+        allowed = f"a path, or the name of a shipped {kind} file: {names}"
     if beside is not None:
         return Fault(str(beside), "extends", found, allowed)
     if "," in str(name):
