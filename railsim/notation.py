@@ -30,7 +30,7 @@ SHOWN_UNITS = {
 Formula = Callable[[Mapping[str, Any]], Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Quantity:
     """A named quantity of a result.
 
@@ -49,7 +49,10 @@ class Quantity:
     scale: float  # shown value = stored value times `scale`
     sign: str = ""  # what a positive value means; empty for magnitudes and where the name says it
     request: str = ""  # key of `settings.outputs` that asks for it; empty for the usual quantities
-    formula: Formula | None = field(default=None, compare=False, repr=False)
+    formula: Formula | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        return f"<Quantity {self.name} [{self.unit}]>"
 
     def text(self, value: float) -> str:
         """Return a stored value as text in the shown unit, without the unit.

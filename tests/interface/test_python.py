@@ -139,6 +139,12 @@ def test_results_and_tracks_draw_themselves(result, tmp_path):
     assert railsim.load_track("curve_r250").plot().axes
 
 
+def test_a_peak_fits_on_a_line_of_a_notebook(result):
+    peak = railsim.peaks(result)[0]
+    assert repr(peak).startswith(f"Peak(quantity=<Quantity Q [N]>, value={peak.value}, labels={{")
+    assert len(repr(peak)) < 250
+
+
 def test_static_loads_carry_the_weight(coach):
     loads = railsim.static_loads(coach)
     assert loads.Q0.sum() == pytest.approx(coach.mass * 9.81, rel=1e-6)
