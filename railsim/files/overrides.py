@@ -42,8 +42,6 @@ def with_values(
 ) -> Source:
     """Return the source with values of Python at `key.path`s; as `apply_overrides`.
 
-    Arrays and numbers of numpy count as lists and numbers.
-
     Raises InputError: keys that lead nowhere; all of them at once.
     """
     if not isinstance(values, Mapping):
