@@ -36,7 +36,8 @@ class FileDefinition(Definition):
 
     def __init__(self, /, **values: Any) -> None:
         """Check the values; raises InputError: everything that is wrong in them."""
-        values = plain(values)  # as those of a file, so that faults are located alike
+        # as those of a file, so that faults are located alike
+        values = {"format": self.format_name(), **plain(values)}
         try:
             super().__init__(**values)
         except ValidationError as error:

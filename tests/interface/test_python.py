@@ -272,7 +272,7 @@ def test_a_wrong_argument_is_one_clear_error(given, words, coach):
 
 def test_arrays_and_paths_are_values_as_in_a_file():
     plan, rows = [{"type": "STR", "length": np.float32(50.0)}], np.zeros((2, 3))
-    make = partial(railsim.Track, format="railsim-track/1", name="own", plan=plan)
+    make = partial(railsim.Track, name="own", plan=plan)
     track = make(friction=np.array([0.3, 0.2]), rail=Path("54E1"))
     assert (track.friction, track.rail) == ((0.3, 0.2), ("54E1", "54E1"))
     with pytest.raises(InputError) as caught:
