@@ -139,10 +139,10 @@ class RailsimError(Exception):
 
 
 class InputError(RailsimError):
-    """The input is wrong; `faults` lists the first hundred, each once, and a count."""
+    """The input is wrong; `faults` lists what was found, the first hundred and a count."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
-        faults = list(dict.fromkeys(faults))
+        faults = list(faults)
         if (more := len(faults) - MOST_FAULTS) > 1:
             faults[MOST_FAULTS:] = [Fault(faults[-1].file, "", f"{more} more faults", "")]
         self.faults = tuple(faults)

@@ -16,6 +16,7 @@ from railsim.animation.movie import write_movie
 from railsim.animation.page import ENDINGS as PAGES
 from railsim.animation.page import write_page
 from railsim.animation.scene import FILM_FRAMES, FRAMES, Scene, mode_scene, result_scene
+from railsim.errors import argument_error
 from railsim.files.access import check_file
 from railsim.result import Result
 
@@ -55,6 +56,8 @@ def animate(
         The result lacks something; the name or the location; MP4 without ffmpeg.
     """
     check_file(Path(path), overwrite=overwrite, endings=(*PAGES, *FILMS))
+    if frames_per_second < 1:
+        raise argument_error("frames_per_second", f"found {frames_per_second}", "1 or more")
     film = Path(path).suffix.lower() in FILMS
     if not isinstance(shown, Scene):
         shown = result_scene(shown, frames=FILM_FRAMES if film else FRAMES)

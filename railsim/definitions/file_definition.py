@@ -41,8 +41,8 @@ class FileDefinition(Definition):
         try:
             super().__init__(**values)
         except ValidationError as error:
-            kind = type(self)
-            raise InputError(validation_faults(error, Source(kind.KIND, values), kind)) from None
+            faults = validation_faults(error, Source(self.KIND, values), type(self))
+            raise InputError(dict.fromkeys(faults)) from None
 
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # not that of files
 
@@ -202,7 +202,7 @@ def validated(model: type[D], source: Source) -> D:
     else:
         faults = faults or located(definition.contradictions())
     if faults:
-        raise InputError(faults)
+        raise InputError(dict.fromkeys(faults))
     return definition.settled()
 
 

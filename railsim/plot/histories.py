@@ -44,6 +44,9 @@ def histories(
     does not have, an empty part.
     """
     check_not_empty(result)
+    for name, value, choices in (("over", over, "distance time"), ("by", by, "wheel wheelset")):
+        if value not in choices.split():
+            raise argument_error(name, f"found {value!r}", choices.replace(" ", " or "))
     window = slice(None) if between is None else _window(result[over], between)
     rows = panels(result, tuple(selections or _default(result)))
     if by == "wheelset":
@@ -71,6 +74,8 @@ def check_not_empty(result: Result, name: str = "") -> None:
 
 
 def _window(horizontal: Floats, between: tuple[float, float]) -> slice:
+    if np.shape(between) != (2,):
+        raise argument_error("between", f"found {between!r}", "two numbers: begin and end")
     start, stop = np.searchsorted(horizontal, between)
     if stop - start < 2:
         found = f"nothing between {between[0]:g} and {between[1]:g}"

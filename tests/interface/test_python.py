@@ -345,6 +345,15 @@ def test_names_instead_of_what_they_stand_for_are_told(coach, result):
             show("run.h5")
     with pytest.raises(TypeError, match=r"found 'coach'; give what railsim.load_... or open_resu"):
         railsim.describe("coach")
+    for how, words in (
+        ({"over": "Q"}, "over: found 'Q'; distance or time"),
+        ({"by": "axle"}, "by: found 'axle'; wheel or wheelset"),
+        ({"between": 5}, "between: found 5; two numbers"),
+    ):
+        with pytest.raises(InputError, match=words):
+            result.plot("Y", **how)
+    with pytest.raises(InputError, match="frames_per_second: found 0; 1 or more"):
+        railsim.animate(result, "film.gif", frames_per_second=0)
     with pytest.raises(InputError, match=r"files: found <Result: .*; the path of a result file"):
         railsim.write_report(result, "page.html")
     with pytest.raises(TypeError, match="the track is 'straight'"):
