@@ -241,7 +241,7 @@ def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
 def to_bytes(figure: Figure, form: str = "png", **how: Any) -> bytes:
     """Return the file of a figure in a format of matplotlib's; `how`: of `Figure.savefig`."""
     stream = BytesIO()
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), styled():  # the same names in each SVG of a figure
         # letters that the font lacks are drawn as boxes, and that is seen
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(stream, format=form, **how)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,6 +32,7 @@ from railsim.plot.style import (
     label_grid,
     shade,
     spans,
+    to_bytes,
     wheelset_looks,
 )
 from railsim.plot.track import track_figure
@@ -662,3 +664,14 @@ def test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum(
         assert over_low(read) > 1.4  # the chord doubles waves of twice its length over odd numbers
     assert main(["plot", "curve_r250", "recording", "--out", str(tmp_path / "no.png")]) == 2
     assert "no recording" in capsys.readouterr().err
+
+
+def test_an_svg_of_the_same_picture_is_the_same_but_for_its_date():
+    """Names of clip paths are random by default, so that every run would differ."""
+    pictures = []
+    for _ in range(2):
+        figure = Figure()
+        figure.subplots().plot([0.0, 1.0])
+        text = to_bytes(figure, "svg").decode()
+        pictures.append(re.sub("<dc:date>.*</dc:date>", "", text))
+    assert pictures[0] == pictures[1]
