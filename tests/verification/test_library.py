@@ -193,6 +193,36 @@ def test_y25_bogie_turns_in_a_curve_against_the_friction_of_bowl_and_side_bearer
     assert -moment == pytest.approx(0.3 * (0.127 * bowl + 0.85 * bearers), rel=0.01)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
+def test_three_piece_bogie_turns_in_a_curve_against_the_friction_of_plate_and_side_bearers():
+    """On its way into R 200 m: 2/3 mu N R of the plate and mu N 0.75 m of two side bearers."""
+    plan = [
+        {"type": "STR", "length": 6.0},
+        {"type": "CLO", "length": 10.0},
+        {"type": "CIR", "length": 30.0, "radius": 200.0},
+    ]
+    wagon = load_vehicle("wagon_three_piece_25t")
+    result = railsim.simulate(
+        wagon,
+        load_track("straight").replace(plan=plan),
+        speed=4.0,
+        until=16.0,
+        settings=Settings().with_values({"outputs": {"elements": ["front.*"]}}),
+    )
+
+    moment = 0.0
+    for element in flatten(wagon).elements:
+        if element.name.startswith(("front.centre_plate", "front.side_bearer")):
+            x, y, _ = np.subtract(element.point1, [4.6, 0.0, 0.0])
+            force = result.series("element_force", element=element.name)[-1]
+            moment += x * force[1] - y * force[0]
+    bearers = 2.0 * 16.7e3
+    plate = 90e3 * GRAVITY / 2.0 - bearers
+    assert abs(moment) == pytest.approx(
+        0.3 * (2.0 / 3.0 * 0.178 * plate + 0.75 * bearers), rel=0.01
+    )
+
+
 def test_c62a_stands_higher_when_empty_by_its_bolster_springs():
     empty, _, _ = standing("wagon_c62a_empty")
     laden, _, _ = standing("wagon_c62a")
