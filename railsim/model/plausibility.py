@@ -52,6 +52,10 @@ INERTIA = 1.3
 """Moment of inertia over the sum of the other two: at most 1, in published data up to 1.29."""
 GYRATION = (0.05, 15.0)
 """Radius of gyration of a body [m]: bolsters have 0.2 m, long cars 9 m."""
+BESIDE = 5.0
+"""Distance of an element from the middle of the track [m]: wagons are 3.5 m wide."""
+SLIDING = 0.05
+"""Displacement of a pad at rest before it slides [m]: rubber 10 mm, steel on steel 1 mm or less."""
 HEIGHT = 8.0
 """Height of a body above the rails [m]: raised pantographs reach 6.5 m."""
 DAMPER = (200.0, 1e7)
@@ -208,6 +212,10 @@ def _lengths(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterat
     names = [name for name, most in far.items() if most > LONGEST]
     if names:
         yield one_remark(f"up to {max(far.values()):g} m from the origin: are lengths in m?", names)
+    beside = {e.name: max(abs(e.point1[1]), abs(e.point2[1])) for e in flat.elements}
+    if names := [name for name, y in beside.items() if BESIDE < y <= LONGEST]:
+        most = max(beside[name] for name in names)
+        yield one_remark(f"up to {most:g} m beside the middle of the track: is it in m?", names)
     travels = {e.name: _travel(e.definition) for e in flat.elements}
     names = [name for name, most in travels.items() if most > TRAVEL]
     if names:
@@ -434,9 +442,13 @@ def _from_below(element: FlatElement, kinds: Mapping[str, str]) -> bool:
 
 
 def _other_loads(supports: Supports) -> Iterator[tuple[str, FlatElement]]:
-    """Springs whose load is unlike that at which they were measured, or that are compressed far."""
+    """Pads that stick for too long; springs with another load than measured, or compressed far."""
     for element, load in supports:
         law = element.definition
+        if isinstance(law, SideBearer):
+            way = law.friction_coefficient * load / law.stick_stiffness
+            if way > SLIDING:
+                yield f"slides after {way:.3g} m only: is stick_stiffness in N/m?", element
         measured = getattr(law, "load_at_length", None)
         if measured is not None and not SPRING_LOAD[0] <= load / measured[0] <= SPRING_LOAD[1]:
             yield (

@@ -56,6 +56,15 @@ INCLINED = {  # 3 parts across, 4 down of 5
     "damping": 0.0,
 }
 
+PLATE = {
+    "kind": "centre_plate",
+    "bodies": ["axle", "frame"],
+    "point": [0.0, 0.0, -0.75],
+    "stiffness": 2e8,
+    "friction_coefficient": 0.3,
+    "stick_stiffness": 1e8,
+}
+
 DAMPER = {
     "kind": "spring_damper",
     "bodies": ["frame", "axle"],
@@ -103,6 +112,11 @@ def test_admissible_speed_in_kilometres_per_hour_is_remarked():
             vehicle(spring={"points": [[0.0, 1000.0, -900.0], [0.0, 1000.0, -600.0]]}),
             "spring.left, spring.right",
             "up to 1000 m from the origin: are lengths in m?",
+        ),
+        (
+            vehicle(plate={**PLATE, "radius": 178.0}),
+            "plate.pad_2",
+            "up to 106.35 m beside the middle of the track",
         ),
         (
             vehicle(axle={"radius": 460.0, "position": [0.0, 0.0, -460.0]}),
@@ -217,6 +231,14 @@ def slide(coefficient):
     return vehicle(spring={"kind": "friction", **where, **stick})
 
 
+def sticking(way):
+    """Pads in place of the springs that slide after this way at their load at rest."""
+    pad = {"kind": "side_bearer", "bodies": ["axle", "frame"], "points": None, "damping": 0.0}
+    law = {"preload": "auto", "stiffness": 4e5, "friction_coefficient": 0.3}
+    stick = {"point": [0.0, 1.0, -0.46], "stick_stiffness": 0.3 * WEIGHT / way}
+    return vehicle(spring={**pad, **law, **stick})
+
+
 def wheel(radius):
     return vehicle(axle={"radius": radius, "position": [0.0, 0.0, -radius]})
 
@@ -238,6 +260,8 @@ LIMITS = {  # how a vehicle has some value, what it is called, the last usual va
     "light": (wheels, "mean static wheel load", 8.01e3, 7.99e3),
     "heavy": (wheels, "mean static wheel load", 249e3, 251e3),
     "far": (lambda x: at(y=x), "from the origin", 499.0, 501.0),
+    "beside": (lambda x: at(y=x), "beside the middle of the track", 4.99, 5.01),
+    "sticking": (sticking, "is stick_stiffness in N/m?", 0.0499, 0.0501),
     "high": (lambda x: vehicle(body={"position": [0.0, 0.0, -x]}), "above the rails", 7.99, 8.01),
     "not at the axle": (lambda x: at(x=x), "acts on axle from", 1.499, 1.501),
     "loose": (stop_after, "no force before", 0.999, 1.001),
