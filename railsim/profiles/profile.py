@@ -76,7 +76,9 @@ class Profile:
         if self.kind not in get_args(Kind):
             raise input_error(at, shortened(repr(self.kind)), "wheel or rail", key="kind")
         y, (top, bottom) = self.y[[0, -1]], (self.z.min(), self.z.max())
-        if y[0] >= y[1] or (top < -0.02 and bottom < 0.005):  # no flange, no side of a head
+        level = self.z[np.argmin(np.abs(self.y))]  # heights may count from the axle
+        upwards = top < level - 0.02 and bottom < level + 0.005  # no flange, no side of a head
+        if y[0] >= y[1] or upwards:
             found = f"y from {y[0]:g} to {y[1]:g}, z {top:g} to {bottom:g}"
             allowed = "y rises from the flange or gauge side to the field side, z points down"
             raise input_error(at, found, allowed, key="y, z")

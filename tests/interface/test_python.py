@@ -369,7 +369,10 @@ def test_names_instead_of_what_they_stand_for_are_told(coach, result):
         ({"y": [0.0, 1.0]}, "arrays of shape (2,) and (3,)"),
         ({"kind": "wheels"}, "'wheels'; wheel or rail"),
         ({"y": [0.2, 0.1, 0.0]}, "y from 0.2 to 0, z 0 to 0; y rises from the flange or gauge"),
-        ({"z": [-0.01, -0.028, 0.003]}, "y from 0 to 0.2, z -0.028 to 0.003; y rises from"),
+        (
+            {"y": [-0.04, 0.0, 0.06], "z": [-0.028, 0.0, 0.003]},
+            "y from -0.04 to 0.06, z -0.028 to 0.003; y rises from",
+        ),
     ],
 )
 def test_points_that_are_no_profile_are_refused(changes, words):

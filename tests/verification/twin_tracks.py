@@ -147,7 +147,7 @@ def level(wave, curvature=0.0):
     flat = [{"type": "CST", "length": BEGIN, "gradient": 0.0}]
     waved = _track(wave, plan, vertical=[*flat, *ramps, {**flat[0], "length": AFTER}])
     s = _stations(wave)
-    z = -(Alignment(waved)._gradient.integral(s))
+    z = -(Alignment(waved).gradient.integral(s))
     return waved, _track(wave, plan, irregularities=[_measured(s, 0.0, z, 0.0, z)])
 
 
