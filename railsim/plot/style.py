@@ -34,7 +34,6 @@ STYLE: Any = {
     "figure.titlesize": 11.5, "figure.titleweight": "bold", "font.size": 9, "grid.color": "0.88",
     "grid.linewidth": 0.6, "legend.fontsize": 8.5, "legend.frameon": False, "lines.linewidth": 1.2,
     "mathtext.fontset": "dejavusans", "xtick.labelsize": 8.5, "ytick.labelsize": 8.5,
-    "svg.hashsalt": "railsim",
 }  # fmt: skip
 
 HUES = (("#004a80", "#56a8e0"), ("#b8450a", "#f0a13c"), ("#00664b", "#5cc0a0"),
@@ -241,7 +240,8 @@ def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
 def to_bytes(figure: Figure, form: str = "png", **how: Any) -> bytes:
     """Return the file of a figure in a format of matplotlib's; `how`: of `Figure.savefig`."""
     stream = BytesIO()
-    with warnings.catch_warnings(), styled():  # the same names in each SVG of a figure
+    salt: Any = {"svg.hashsalt": "railsim"}  # the same names in each SVG of a figure
+    with warnings.catch_warnings(), matplotlib.rc_context(salt):
         # letters that the font lacks are drawn as boxes, and that is seen
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(stream, format=form, **how)
