@@ -118,7 +118,7 @@ def test_friction_elements_need_their_run_in(monkeypatch):
 
 
 def test_curving_has_what_the_way_leaves_in_friction_elements():
-    """Mean values of a run of 15 s in the curve; without these forces Y would be 3.5 kN, not 9.4.
+    """Means of a run of 15 s in the curve, of quotients too: it does not come to rest.
 
     The table of the two curves is of the outer wheel on either hand.
     """
@@ -130,7 +130,7 @@ def test_curving_has_what_the_way_leaves_in_friction_elements():
         assert left[name] == pytest.approx(right[name], rel=1e-3)
     for name in ("Y", "lateral", "attack"):
         assert left[name] == pytest.approx(-right[name], rel=1e-3)
-    assert right["Y_over_Q"] == pytest.approx(-right["Y"] / right["Q"])
+    assert right["Y_over_Q"] == pytest.approx(-right["Y"] / right["Q"], rel=1e-4)
     track = railsim.load_track("straight").replace(
         plan=[
             {"type": "STR", "length": 30.0},
