@@ -143,7 +143,7 @@ def suspicions(
         )
         texts.append(
             f"{later} against {earlier}: {1e3 * (high - low):.3g} ms later than simulated. With as "
-            "many channels on either side it is open which are wrong: 'delay'?"
+            "many channels on either side it cannot be told which are wrong: 'delay'?"
         )
     if clocks and abs(drift) > APART * step:
         texts.append(
