@@ -166,22 +166,24 @@ def test_uneven_load_gives_the_wheel_loads_of_its_moment():
     assert 0.075 + (1.90 - 0.85) * 0.012 / 0.85 < lever < 0.11
 
 
+def into_a_curve(wagon, lengths, radius, elements, **how):
+    """Run from a straight over a transition into a curve, with the forces of elements."""
+    plan = [
+        {"type": "STR", "length": lengths[0]},
+        {"type": "CLO", "length": lengths[1]},
+        {"type": "CIR", "length": 30.0, "radius": radius},
+    ]
+    settings = Settings().with_values({"outputs": {"elements": elements}})
+    track = load_track("straight").replace(plan=plan)
+    return railsim.simulate(wagon, track, settings=settings, **how)
+
+
 @pytest.mark.usefixtures("small_contact_tables")
 def test_y25_bogie_turns_in_a_curve_against_the_friction_of_bowl_and_side_bearers():
     """On its way into R 250 m: mu N 2/3 R of the bowl and mu N 0.85 m of two side bearers."""
-    plan = [
-        {"type": "STR", "length": 10.0},
-        {"type": "CLO", "length": 15.0},
-        {"type": "CIR", "length": 30.0, "radius": 250.0},
-    ]
     names = ["front.centre_bowl*", "front.side_bearer.*"]
-    result = railsim.simulate(
-        load_vehicle("wagon_y25"),
-        load_track("straight").replace(plan=plan),
-        speed=8.0,
-        until=24.0,
-        settings=Settings().with_values({"outputs": {"elements": names}}),
-    )
+    wagon = load_vehicle("wagon_y25")
+    result = into_a_curve(wagon, (10.0, 15.0), 250.0, names, speed=8.0, until=24.0)
 
     def at_the_end(element, axis):
         return result.series("element_force", element=f"front.{element}", component=axis)[-1]
@@ -196,20 +198,8 @@ def test_y25_bogie_turns_in_a_curve_against_the_friction_of_bowl_and_side_bearer
 @pytest.mark.usefixtures("small_contact_tables")
 def test_three_piece_bogie_turns_in_a_curve_against_the_friction_of_plate_and_side_bearers():
     """On its way into R 200 m: 2/3 mu N R of the plate and mu N 0.75 m of two side bearers."""
-    plan = [
-        {"type": "STR", "length": 6.0},
-        {"type": "CLO", "length": 10.0},
-        {"type": "CIR", "length": 30.0, "radius": 200.0},
-    ]
     wagon = load_vehicle("wagon_three_piece_25t")
-    result = railsim.simulate(
-        wagon,
-        load_track("straight").replace(plan=plan),
-        speed=4.0,
-        until=16.0,
-        settings=Settings().with_values({"outputs": {"elements": ["front.*"]}}),
-    )
-
+    result = into_a_curve(wagon, (6.0, 10.0), 200.0, ["front.*"], speed=4.0, until=16.0)
     moment = 0.0
     for element in flatten(wagon).elements:
         if element.name.startswith(("front.centre_plate", "front.side_bearer")):

@@ -366,20 +366,24 @@ lever = { angle = -0.4 }
 """
 
 
+def dead_at_the_end(path, text, size):
+    """Joints that are named of two loops of a size, at the end of their motion."""
+    text = text.replace("base = 1.0", f"base = {size}").replace("arm = 0.4", f"arm = {0.4 * size}")
+    far = 'far = ["1.9 * base", "-0.3 * base"]\n[bodies.crank]'
+    path.write_text(text.replace("[bodies.crank]", far))
+    model = build(load_mechanism(path))
+    motion = solve(model, np.linspace(model.start, model.end, 30))
+    return dead_loop(model, model.end, motion.q[-1], motion.arcs[-1])
+
+
 @pytest.mark.parametrize("size", [0.1, 1.0, 10.0])
 def test_joints_at_a_dead_point_are_those_of_its_loop_whatever_the_size(tmp_path, size):
     """A second loop, driven by a parallelogram that is 1.5 mrad from the line, is not at one.
 
     There it bears some 0.7 permille of the forces of the first loop.
     """
-    path = tmp_path / "two.toml"
     text = FOUR_BAR.format(rocker=0.4 * size, end=-1.5e-3) + "start = -0.5\n" + SECOND_LOOP
-    text = text.replace("base = 1.0", f"base = {size}").replace("arm = 0.4", f"arm = {0.4 * size}")
-    far = 'far = ["1.9 * base", "-0.3 * base"]\n[bodies.crank]'
-    path.write_text(text.replace("[bodies.crank]", far))
-    model = build(load_mechanism(path))
-    motion = solve(model, np.linspace(model.start, model.end, 30))
-    named = dead_loop(model, model.end, motion.q[-1], motion.arcs[-1])
+    named = dead_at_the_end(tmp_path / "two.toml", text, size)
     assert named == ("left", "right", "begin", "end")
 
 
@@ -393,16 +397,10 @@ def test_a_loop_that_drives_the_one_at_a_dead_point_is_not_named(tmp_path, size)
         return np.linalg.norm(far - end) - 2.0 * rod
 
     dead = brentq(short_of, -0.9, -0.5)
-    path = tmp_path / "two.toml"
     text = FOUR_BAR.format(rocker=arm * size, end=dead + 1e-7) + "start = -0.5\n" + SECOND_LOOP
-    text = text.replace("base = 1.0", f"base = {size}").replace("arm = 0.4", f"arm = {arm * size}")
     second = text.index("[bodies.rod]")
     text = text[:second] + text[second:].replace('"base"', '"0.3 * base"').replace("0.9", "0.3")
-    place = 'far = ["1.9 * base", "-0.3 * base"]\n[bodies.crank]'
-    path.write_text(text.replace("[bodies.crank]", place))
-    model = build(load_mechanism(path))
-    motion = solve(model, np.linspace(model.start, model.end, 30))
-    named = dead_loop(model, model.end, motion.q[-1], motion.arcs[-1])
+    named = dead_at_the_end(tmp_path / "two.toml", text, size)
     assert named == ("right", "far", "third", "fourth")
 
 
