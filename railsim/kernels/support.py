@@ -68,6 +68,9 @@ FORCE_TOLERANCE, RATE_TOLERANCE = 2e-4, 1e-2
 # forces change as the rails are corrected; beyond it the contact is evaluated again
 SLOPE_RANGE_Y, SLOPE_RANGE_Z = 4e-3, 2e-2
 MAX_CORRECTIONS, MAX_BALANCES = 10, 50
+# share of a rail's inertia and pads that a contact may take away laterally: where a patch wanders
+# into a flange its force falls as the wheel comes on, and the matrix would become singular
+MAX_RELIEF = 0.5
 
 # entries of Support.row: masses, then stiffness and damping of pads and ballast in y, z and roll
 (
@@ -231,7 +234,7 @@ def solve_track(support, factors, K, D, b, m, c, k):
     arm = base * load_lanes(SIDES, 0)
     a_y = pads * (c * row[C_PAD_Y] + k * row[K_PAD_Y])
     a_z = pads * (c * row[C_PAD_Z] + k * row[K_PAD_Z])
-    p = rail + a_y + c * D[0] + k * K[0]
+    p = rail + a_y + c * D[0] + maximum(k * K[0], -MAX_RELIEF * (rail + a_y))
     q = c * D[1] + k * K[1]
     r = c * D[3] + k * K[3]
     t = rail + a_z + c * D[4] + k * K[4]

@@ -31,8 +31,9 @@ from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 
 SEEDS, MORE = 20, 300
-# that run each time; 138, 97: a flange meets the lateral ramp, the former leaves its rail there
-ALWAYS = (1, 138, 97)
+# that run each time; 138, 97, 52: a flange meets the lateral ramp; 138 leaves its rail there, the
+# hollow wheel of 52 goes from tread to flange within a step, on a rail that moves
+ALWAYS = (1, 138, 97, 52)
 # Vehicle and speed up to which it is run [m/s].  The first seeds draw from the first four, whose
 # step is soon found, on rails at 1:40: their contact tables are those of other tests.
 VEHICLES = (
@@ -59,10 +60,6 @@ RADII = (190.0, 250.0, 350.0, 500.0, 800.0, 2000.0, np.inf)
 # 25.9, 23.9, 23.2 and 24.6 kN at 1/1800, 1/2000, 1/4000 and 1/8000 s, by RK4 23.7 kN.  Remarks say
 # so.
 OPEN = (24, 30, 65, 73, 138, 143, 214, 244, 277)
-# A flange meets the ramp, rails that move aside at 0.8 m/s, within one step of 1/1400 s, and is
-# thrown inwards beyond the contact table; at 1/2000 to 1/8000 s and by RK4 runs are complete: root
-# mean squares of Q - Q0 8.1 kN, of Y 3.3 to 3.4 kN.
-THROWN = pytest.param(52, marks=pytest.mark.xfail(strict=True, reason="thrown off in one step"))
 TOO_LONG = "the step is too long there"
 BEYOND = "beyond all experience"
 RAMP = ramp(0.5, begin=14.0).irregularities[0]  # track case 4 of the benchmarks
@@ -235,8 +232,6 @@ def test_a_step_that_is_too_long_is_remarked_upon():
 
 
 @pytest.mark.further
-@pytest.mark.parametrize(
-    "seed", [k if k != 52 else THROWN for k in range(SEEDS + MORE) if k not in ALWAYS]
-)
+@pytest.mark.parametrize("seed", [k for k in range(SEEDS + MORE) if k not in ALWAYS])
 def test_further_random_combination(seed):
     check(seed)
