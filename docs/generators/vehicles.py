@@ -268,10 +268,10 @@ def loads(vehicle: Vehicle) -> str:
 def modes(vehicle: Vehicle) -> list[str]:
     """Modes at the admissible speed, and the stability beyond it."""
     V = vehicle.service.admissible_speed
-    found = railsim.modes(vehicle, speed=V).record()["modes"]
+    found = railsim.modes(vehicle, speed=V).record()
     rows = [
         (mode["name"], f"{mode['natural_frequency']:.2f}", f"{100.0 * mode['damping_ratio']:.1f}")
-        for mode in sorted(found, key=lambda mode: mode["natural_frequency"])
+        for mode in sorted(found["modes"], key=lambda mode: mode["natural_frequency"])
         if 0.05 < mode["natural_frequency"] < FASTEST
         and abs(mode["damping_ratio"]) < 0.999
         and not mode["name"].startswith("rolling")
@@ -284,7 +284,7 @@ def modes(vehicle: Vehicle) -> list[str]:
         f"least damped mode is {worst['name']} at {worst['natural_frequency']:.2f} Hz with a "
         f"damping of {100.0 * worst['damping_ratio']:.2f} %."
     )
-    if worst["damping_ratio"] < 0.0:
+    if worst["damping_ratio"] < 0.0 and any("friction elements" in r for r in found["remarks"]):
         verdict += (
             " Dry friction, which linear analysis takes as sticking, limits this motion; see "
             "[Vehicles and tracks](../validation/vehicles_and_tracks.md) for runs at the "

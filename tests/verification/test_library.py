@@ -317,6 +317,14 @@ def test_pages_of_the_library_are_up_to_date(pages):
     assert overview == pages.overview(overview), mended_by
 
 
+def test_dry_friction_limits_the_motion_of_vehicles_that_have_some_alone(pages):
+    pads = ("friction", "wedge", "centre_plate", "side_bearer")
+    for name in pages.VEHICLES:
+        if "Dry friction, which" in (pages.PAGES / f"{name}.md").read_text("utf-8"):
+            elements = flatten(load_vehicle(name)).elements
+            assert any(element.definition.kind in pads for element in elements), name
+
+
 def test_a_letter_stands_beside_every_number_of_a_vehicle(pages):
     # what follows from the other numbers of its table, or tells nothing of the vehicle
     free = ("kind", "bodies", "sides", "axis", "wheelset", "category", "description", "reference",
