@@ -21,6 +21,7 @@ from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.description.library import MEANING, text_with_bases, trust
 from railsim.files.sources import read_toml, shipped_folder
+from railsim.linear.vehicle import laws_in_words
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.statics import SLOW
@@ -304,8 +305,8 @@ def hunting(vehicle: Vehicle) -> str:
     found = railsim.critical_speed(vehicle)
     where = found.conditions
     words = (
-        f"Rails {where['rails']}, friction {where['friction']}, creep law {where['law']}, up to "
-        f"{3.6 * found.high:.0f} km/h: "
+        f"Rails {where['rails']}, friction {where['friction']}, {laws_in_words(where)}, "
+        f"up to {3.6 * found.high:.0f} km/h: "
     )
     if found.linear is None:
         words += "no loss of stability at rest"

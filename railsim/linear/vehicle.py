@@ -70,6 +70,12 @@ def conditions(track: Track, settings: Settings) -> dict[str, str]:
     return {"rails": track.support.preset, **words, "friction": track.friction_words}
 
 
+def laws_in_words(where: Mapping[str, str]) -> str:
+    """Return the creep law of the runs, and that of the linearisation where it is another."""
+    linear = where["linear_law"]
+    return f"creep law {where['law']}" + (f" (linear: {linear})" if linear != where["law"] else "")
+
+
 @dataclass(frozen=True)
 class Contact:
     """How the contact of wheel and rail is linearised."""

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from railsim.linear.stationary import TwistLoop
+from railsim.linear.vehicle import laws_in_words
 from railsim.notation import SIDES
 from railsim.plot.style import BESIDE, DISTINCT, LIMIT, Picture, distinct, note, say, single, styled
 from railsim.stability.branches import THRESHOLD, Branch
@@ -32,9 +33,9 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
 
     `title`: By default vehicle, rails, friction and creep law.
     """
-    rails, friction, law = (found.conditions[key] for key in ("rails", "friction", "law"))
-    words = f"straight track, rails {rails}, friction {friction}, {law}"
-    title = title or f"{found.vehicle}\n{words}"
+    where = found.conditions
+    words = f"straight track, rails {where['rails']}, friction {where['friction']}"
+    title = title or f"{found.vehicle}\n{words}, {laws_in_words(where)}"
     if not found.branches:
         return _linear_figure(found, title)
     # shooting knows no forces

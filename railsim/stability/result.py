@@ -11,7 +11,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.errors import optional_package
-from railsim.linear.vehicle import Contact, LinearVehicle
+from railsim.linear.vehicle import Contact, LinearVehicle, laws_in_words
 from railsim.plottable import Plottable
 from railsim.stability.branches import COLUMNS, Branch, Jump, Limit, Point
 from railsim.table import Column, Table
@@ -184,9 +184,8 @@ class CriticalSpeed(Plottable):
         """Return all critical speeds with their method, jumps and limits."""
         where = self.conditions
         caption = (
-            f"{self.vehicle}, rails {where['rails']}, friction {where['friction']}, creep law "
-            f"{where['law']} (linear: {where['linear_law']}), searched from {self.low:g} to "
-            f"{self.high:g} m/s"
+            f"{self.vehicle}, rails {where['rails']}, friction {where['friction']}, "
+            f"{laws_in_words(where)}, searched from {self.low:g} to {self.high:g} m/s"
         )
         return Table(TABLE, self._rows(), caption)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import RailsimError
-from railsim.linear.vehicle import AMPLITUDE, Contact
+from railsim.linear.vehicle import AMPLITUDE, Contact, laws_in_words
 from railsim.processes import WorkerPool, available_cores
 from railsim.profiles.used import profile_hashes
 from railsim.stability.critical_speed import checked, critical_speed
@@ -146,7 +146,7 @@ def map_table(records: Sequence[Record], parameters: Mapping[str, str]) -> Table
     where: dict[str, str] = next(
         (record["conditions"] for record in records if "conditions" in record), {}
     )
-    words = [f"{key} {value}" for key, value in where.items() if key in ("rails", "law")]
+    words = [f"rails {where['rails']}", laws_in_words(where)] if where else []
     if "friction" not in parameters and where:
         words.append(f"friction {where['friction']}")
     return Table(columns, rows, ", ".join(words))

@@ -75,7 +75,9 @@ def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path, undra
     folder = tmp_path / "map"
     command = map_command(folder)
     assert main(command) == 0
-    assert "friction" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "friction" in told
+    assert "creep law FASTSIM 10 x 10 cells (linear: FASTSIM 100 x 100 cells)" in told
     kept = sorted((folder / "points").iterdir())
     assert len(kept) == 2
     (folder / "critical_speed.json").unlink()
