@@ -72,8 +72,8 @@ def conditions(track: Track, settings: Settings) -> dict[str, str]:
 
 def laws_in_words(where: Mapping[str, str]) -> str:
     """Return the creep law of the runs, and that of the linearisation where it is another."""
-    linear = where["linear_law"]
-    return f"creep law {where['law']}" + (f" (linear: {linear})" if linear != where["law"] else "")
+    law, linear = where["law"], where["linear_law"]
+    return f"creep law {law}" if law == linear else f"creep law {law} (linear: {linear})"
 
 
 @dataclass(frozen=True)

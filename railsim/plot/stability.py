@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from railsim.linear.stationary import TwistLoop
-from railsim.linear.vehicle import laws_in_words
 from railsim.notation import SIDES
 from railsim.plot.style import BESIDE, DISTINCT, LIMIT, Picture, distinct, note, say, single, styled
 from railsim.stability.branches import THRESHOLD, Branch
@@ -31,11 +30,13 @@ SMALL_AMPLITUDES = 6.0  # mm, drawn where no branch was computed
 def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
     """Amplitude, frequency and track shift force of the hunting motion over speed.
 
-    `title`: By default vehicle, rails, friction and creep law.
+    `title`: By default vehicle, rails, friction and the creep law of the branches, or without any
+    that of the linearisation.
     """
-    where = found.conditions
-    words = f"straight track, rails {where['rails']}, friction {where['friction']}"
-    title = title or f"{found.vehicle}\n{words}, {laws_in_words(where)}"
+    of_which = "law" if found.branches else "linear_law"
+    rails, friction, law = (found.conditions[key] for key in ("rails", "friction", of_which))
+    words = f"straight track, rails {rails}, friction {friction}, {law}"
+    title = title or f"{found.vehicle}\n{words}"
     if not found.branches:
         return _linear_figure(found, title)
     # shooting knows no forces

@@ -117,7 +117,7 @@ def test_amplitudes_of_the_conicity_are_there_once_each_with_that_of_the_standar
 def test_conicities_of_all_amplitudes_in_the_picture_are_in_it():
     """Without a branch amplitudes reach to 6 mm."""
     over = Conicity("front", [3e-3, 6e-3, 7e-3], [0.1, 0.2, 0.9])
-    where = {"rails": "rigid", "friction": "0.4", "law": "fastsim"}
+    where = {"rails": "rigid", "friction": "0.4", "law": "of runs", "linear_law": "smooth"}
     found = CriticalSpeed(Contact("tangent", 3e-3, None), "x", where, conicity_over_amplitude=over)
     axes = bifurcation_figure(found).axes[1]
     assert axes.get_ylim() == (0.0, 6.0)
@@ -125,12 +125,13 @@ def test_conicities_of_all_amplitudes_in_the_picture_are_in_it():
 
 
 def test_picture_of_a_vehicle_unstable_at_the_lower_end_says_so():
-    """It said that there is no critical speed, and drew the lower end as one."""
+    """It denied a critical speed, drew the lower end as one, and named the law of runs."""
     line = OverAmplitude([1e-4, 1e-3, 2e-3], [5.0, 7.0, None], [None, 2.0, None])
-    where = {"rails": "rigid", "friction": "0.4", "law": "fastsim"}
+    where = {"rails": "rigid", "friction": "0.4", "law": "of runs", "linear_law": "smooth"}
     found = CriticalSpeed(Contact("tangent", 3e-3, None), "x", where, low=5.0, high=90.0)
     found.unstable_at_low, found.linear_over_amplitude = True, line
     figure = bifurcation_figure(found)
+    assert "friction 0.4, smooth" in figure.get_suptitle()
     assert figure.get_suptitle().endswith("unstable at 5 m/s, the lower end of the range")
     (drawn,) = figure.axes[0].lines
     np.testing.assert_array_equal(drawn.get_xdata(), [np.nan, 7.0, np.nan])
