@@ -2,9 +2,9 @@
 
 The damping of the least damped oscillation over speed, the contact linearised harmonically about
 several lateral amplitudes of the wheelsets, from small motions to the flange. The smallest
-amplitude loses its damping first: at 3 mm the coach seems stable to 60 m/s, and yet it hunts from
-40 m/s on. The non-linear critical speed, below which no disturbance makes it hunt, is found by
-`railsim.critical_speed`.
+amplitude loses its damping first, at 40 m/s; at 3 mm the coach seems stable up to 47 m/s, and yet
+it hunts from flange to flange from 40 m/s on. The non-linear critical speed, below which no
+disturbance makes it hunt, is found by `railsim.critical_speed`.
 """
 
 import matplotlib.pyplot as plt

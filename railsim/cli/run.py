@@ -47,7 +47,7 @@ def command(
     \b
     Example:
       railsim run coach_manchester curve_r250 --speed 20 --overwrite
-      railsim run my_coach.toml curve_r250 --speed 20 --set track.friction=0.3 --out dry.h5
+      railsim run my_coach.toml curve_r250 --speed 20 --set track.friction=0.2 --out wet.h5
       railsim run coach_manchester curve_r250 --speed 20 --check-step --overwrite
     """
     from railsim.definitions.track.layout import track_remarks

@@ -41,6 +41,15 @@ def test_markers_of_filled_tables_alternate():
             check_markers(table + wrong)
 
 
+def test_math_holds_no_escape_that_markdown_takes_for_itself():
+    r"""Of `\!` and `\|` in formulas the pages showed a placeholder."""
+    code, math = r"```.*?```|`[^`\n]*`", r"\$\$.*?\$\$|\$[^$\n]+\$"
+    for page in PAGES:
+        text = re.sub(code, "", page.read_text("utf-8"), flags=re.DOTALL)
+        for formula in re.findall(math, text, flags=re.DOTALL):
+            assert not re.search(r"\\[!|{}_.#>+*()\[\]-]", formula), (page.name, formula)
+
+
 def test_every_generator_of_the_manual_is_registered():
     folder = ROOT / "docs" / "generators"
     modules = {path.stem for path in folder.glob("*.py")} - {"__init__", "filling"}
