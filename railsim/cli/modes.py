@@ -24,7 +24,7 @@ CYCLE = {"frames": 40, "cycles": 1}
 @click.command()
 @cli.vehicle_argument
 @cli.optional_track
-@cli.option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", cli.as_speed, default=20.0)
+@cli.option("--speed", "Speed in m/s, or with a unit: 72km/h; default 20.", "V", cli.as_speed)
 @cli.values("--speeds", "N speeds from A to B: a root locus.", "A:B:N")
 @cli.option("--over", "Root locus over a key of the input at --speed.", "KEY.PATH=A:B:N")
 @cli.flag("--held", "Hold the wheelsets.")
@@ -38,7 +38,7 @@ CYCLE = {"frames": 40, "cycles": 1}
 @cli.output_options("Folder for modes.json, modes.png and, at one speed, modes.html, animated.")
 @cli.code_options
 def command(
-    speed: float,
+    speed: float | None,
     speeds: list[float] | None,
     over: str | None,
     animate: str | None,
@@ -61,8 +61,10 @@ def command(
     """
     from railsim.linear.modes import Modes, RootLocus, modes, root_locus
 
-    if speeds is not None and over is not None:
-        raise input_error("--over", "given together with --speeds", "one of the two")
+    for option, value in (("--over", over), ("--speed", speed)):
+        if speeds is not None and value is not None:
+            raise input_error(option, "given together with --speeds", "one of the two")
+    speed = 20.0 if speed is None else speed
     cli.goes_with("--linearisation harmonic", how["linearisation"] == "harmonic", "amplitude")
     coach, rails, settings = given.inputs()
     if animate is not None and (output.out is None or speeds is not None or over is not None):

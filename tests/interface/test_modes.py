@@ -183,6 +183,7 @@ def test_root_locus_over_a_key(capsys):
         (["--amplitude", "0.003"], "--amplitude goes with --linearisation harmonic"),  # default
         (["--set", "vehicle.bodies.carbody.mas=3"], "mas"),
         (["--radius", "100", "--speed", "60"], "no steady state"),
+        (["--speeds", "10:20:2", "--speed", "20"], "--speed:"),
     ],
 )
 def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
