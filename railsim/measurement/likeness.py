@@ -47,7 +47,7 @@ class Likeness:
             ):
                 return f"{name} is {times} times the simulated one: another 'unit'?"
         if abs(self.drift) > APART * step:
-            return f"{name}: its clock runs apart by {1e3 * self.drift:.3g} ms over the record."
+            return f"{name}: its clock drifts by {1e3 * self.drift:.3g} ms over the record."
         if self.correlation > SURE and abs(self.lag) > APART * step:
             late = f"{1e3 * abs(self.lag):.3g} ms {'later' if self.lag > 0.0 else 'earlier'}"
             return f"{name} comes {late} than simulated: 'delay', or its place on the vehicle?"
@@ -147,7 +147,7 @@ def suspicions(
         )
     if clocks and abs(drift) > APART * step:
         texts.append(
-            f"All channels run apart from the simulation by {1e3 * drift:.3g} ms over the "
+            f"All channels drift from the simulation by {1e3 * drift:.3g} ms over the "
             "record: the mileage or the clock drifts."
         )
     return [remark for remark in texts if remark]

@@ -69,7 +69,7 @@ def position(
         raise input_error(file, found, "the same; are the units right?", key="speed")
     if abs(share) > APART:
         remarks.append(
-            f"Distance and speed run apart by {100 * share:+.2f} % ({s[-1] - s[0]:.1f} m by "
+            f"Distance and speed differ by {100 * share:+.2f} % ({s[-1] - s[0]:.1f} m by "
             f"distance, {driven[-1]:.1f} m by speed); the distance is used."
         )
     return s, speed, remarks

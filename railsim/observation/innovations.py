@@ -205,6 +205,6 @@ def _disagreement(c: float, ratio: float, beyond: float) -> str:
     if c < ALIKE and beyond > BEYOND:
         return (
             f"does not agree with what the other channels say (correlation {c:.2f}): another "
-            "point or axis, or a clock that runs apart?"
+            "point or axis, or a drifting clock?"
         )
     return ""

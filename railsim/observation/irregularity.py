@@ -188,7 +188,7 @@ def _curves(track: Track, measurement: Measurement) -> Iterator[str]:
         yield (
             f"The track has curves between s = {low:.0f} and {high:.0f} m; the linear contact is "
             "that of straight track: neither the estimate nor its standard deviations are to be "
-            "relied upon there; simulated runs know the curves."
+            "relied upon there; simulated runs include the curves."
         )
 
 

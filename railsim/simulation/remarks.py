@@ -274,7 +274,7 @@ def alternation(vibrations: Floats, Q0: Floats, wheelsets: Sequence[str], divide
         f"The guiding force of the {SIDES[side]} wheel of {wheelsets[w]} alternates from step to "
         f"step by {1e-3 * amplitude[w, side]:.1f} kN, vehicle at s = "
         f"{vibrations[w, side, ALTERNATES_AT]:.0f} m: the step is too long there, and the vehicle "
-        f"may be held in a state that is none of its own; compare with half the step "
+        f"may be held in a state that is not its own; compare with half the step "
         f"(--check-step)."
     )
 

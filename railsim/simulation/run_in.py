@@ -378,7 +378,7 @@ def _steady(
         return None
     if (model.system.internal.kind == PAD).any():
         remark(
-            "The run begins with a run-in: what friction elements hold depends on the way there."
+            "The run begins with a run-in: the forces of friction elements depend on the history."
         )
         return None
     speed, friction = float(balance.state[SPEED]), _friction(track, start)

@@ -189,7 +189,7 @@ def test_a_clock_0_3_per_cent_off_is_said_beside_distance_and_speed():
         channels={"Q": {"quantity": "Q:1:left"}, "v": {"quantity": "speed"}},
     )  # fmt: skip
     time = np.linspace(0.0, 40.0, 4001)
-    for clock, words in ((1.0, []), (1.003, ["run apart by -0.30 %"])):
+    for clock, words in ((1.0, []), (1.003, ["differ by -0.30 %"])):
         axes = {"speed": np.full(4001, 50.0), "distance": 50.0 * time}
         said = position("-", how, clock * time, axes, None)[2]
         assert len(said) == len(words)
@@ -254,11 +254,8 @@ def test_clipped_signals_are_said_and_left_out(tmp_path):
         ({"c": {"late": 0.1}}, ["c comes 100 ms later"]),
         ({"c": {"late": -0.1}}, ["c comes 100 ms earlier"]),
         ({name: {"late": 0.1} for name in "abc"}, []),  # of the place, not of the channels
-        ({"a": {"drift": 0.2}}, ["a: its clock runs apart by "]),
-        (
-            {name: {"drift": 0.2} for name in "abc"},
-            ["All channels run apart from the simulation by "],
-        ),
+        ({"a": {"drift": 0.2}}, ["a: its clock drifts by "]),
+        ({name: {"drift": 0.2} for name in "abc"}, ["All channels drift from the simulation by "]),
     ],
 )
 def test_signs_units_delays_and_clocks_that_look_wrong_are_said(changes, words):

@@ -113,7 +113,7 @@ def test_friction_elements_need_their_run_in(monkeypatch):
     remarks = []
     started(test_vehicle("two_axle_wagon"), curve("rigid", 600.0), remarks.append)
     assert remarks == [
-        "The run begins with a run-in: what friction elements hold depends on the way there."
+        "The run begins with a run-in: the forces of friction elements depend on the history."
     ]
 
 
