@@ -207,7 +207,7 @@ def test_distance_and_speed_that_differ_are_said_with_their_difference(share):
     axes = {"distance": (1.0 + share) * WAY, "speed": V}
     s, _, (remark,) = position("made", how, TIME, axes, None)
     assert s == pytest.approx((1.0 + share) * WAY)
-    assert f"apart by {100.0 * share:+.2f} %" in remark
+    assert f"differ by {100.0 * share:+.2f} %" in remark
     assert f"{WAY[-1]:.1f} m by speed" in remark
 
 
