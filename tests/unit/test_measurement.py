@@ -278,7 +278,7 @@ def test_signs_units_delays_and_clocks_that_look_wrong_are_said(changes, words):
     found = suspicions(measured, simulated, quantities, step)
     assert len(found) == min(len(words), 1)
     assert all(word in text for word in words for text in found)
-    for milliseconds in re.findall(r"apart .*by (\S+) ms", " ".join(found)):
+    for milliseconds in re.findall(r"drifts? .*by (\S+) ms", " ".join(found)):
         assert float(milliseconds) == pytest.approx(200.0, abs=1e3 * step)
     of_clocks = any("drift" in own or "late" in own for own in changes.values())
     without = suspicions(measured, simulated, quantities, step, clocks=False)
