@@ -163,7 +163,7 @@ class Settings(FileDefinition):
     creep_law: CreepLawName = "fastsim"
     """Law of the creep forces; `table` is the full theory, tabulated"""
     laws: dict[base.Name, Law] | None = None
-    """Laws of one's own by name: Python functions, executed by permission alone"""
+    """Laws of one's own by name: Python functions, executed only with permission"""
     own_creep_law: LawUse | None = None
     """Creep law of one's own, instead of `creep_law`"""
     own_friction: LawUse | None = None

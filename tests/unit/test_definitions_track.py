@@ -171,12 +171,12 @@ def test_contradicting_track_is_refused(plan, cant, expected):
             "plan.1: 6 m are shorter than the rounding (10 m), over which it is averaged",
         ),
         # from 12100 to 12150 m with its shift of 100 m; its first row is at 12000 m
-        ([STRAIGHT], [], {"irregularities": [RECORDED]}, "shift = -12000 puts its begin at s = 0"),
+        ([STRAIGHT], [], {"irregularities": [RECORDED]}, "shift = -12000 puts its start at s = 0"),
         (  # the track begins at km 11.95
             [STRAIGHT],
             [],
             {"irregularities": [RECORDED], "mileage": 11_950.0},
-            "shift = -11950 puts its begin at s = 50",
+            "shift = -11950 puts its start at s = 50",
         ),
         (
             [STRAIGHT],

@@ -151,7 +151,7 @@ class ShearSpring(base.VerticalSpring, base.SidedElement):
     preload: AutoOrVector = "auto"
     """Force on body 1 in the nominal position along x, y, z [N], or `auto`: from the equilibrium"""
     levelling: Flag = False
-    """Air spring with levelling valve: what stands on such springs alone keeps its height in
+    """Air spring with levelling valve: a body carried only by such springs keeps its height in
     every load case"""
 
     def rows(self) -> Iterator[Mount]:
@@ -186,7 +186,7 @@ class Airspring(base.PreloadAlongAxes, base.PointElement):
     preload: AutoOrVector = "auto"
     """Force on body 1 in the nominal position along x, y, z [N], or `auto`"""
     levelling: Flag = True
-    """With levelling valve: what stands on such springs alone keeps its height in every load
+    """With levelling valve: a body carried only by such springs keeps its height in every load
     case"""
 
     @property

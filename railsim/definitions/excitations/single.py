@@ -20,7 +20,7 @@ class Single(Irregular):
     s: Finite
     """Arc length of its middle [m]"""
     length: Positive
-    """Length from begin to end [m]"""
+    """Length from beginning to end [m]"""
     shape: Literal["cosine", "triangle"] = "triangle"
     """`cosine`: one wave of 1 - cos; `triangle`: two straights, kinks rounded over length / 10, of
     which the middle keeps 95 %"""

@@ -223,9 +223,9 @@ class Cam(Definition):
     body: BodyName | None = None
     """Body that carries the cam, where arcs have centres"""
     tangent: Quantity = 0.0
-    """Direction of the path at its begin, in the axes of the cam's body [rad]"""
+    """Direction of the path at its beginning, in the axes of the cam's body [rad]"""
     arcs: tuple[Arc, ...] = Field(min_length=1)
-    """Arcs from the begin of the motion on"""
+    """Arcs from the beginning of the motion on"""
 
     @check
     def _one_kind(self) -> None:

@@ -27,9 +27,9 @@ class CheckRail(base.Definition):
     rail: base.Side
     """Running rail beside which it stands; it holds the wheelset by the wheel on that rail"""
     flangeway: Annotated[Rows, BeforeValidator(_rows, json_schema_input_type=Width | Rows)]
-    """Rows [s, width] from its begin to its end, linear in between, or one number for a check rail
-    all along, as of grooved rails: from the gauge face of the running rail to its own face, both
-    14 mm below the rail tops [m]"""
+    """Rows [s, width] from its beginning to its end, linear in between, or one number for a check
+    rail all along, as of grooved rails: from the gauge face of the running rail to its own face,
+    both 14 mm below the rail tops [m]"""
     shift: base.Finite = 0.0
     """Added to the arc lengths of `flangeway` [m]"""
     trailing: base.Flag = False

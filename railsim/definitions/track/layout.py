@@ -142,7 +142,7 @@ def track_remarks(track: "Track") -> Iterator[Remark]:
             if shift is not None:
                 needed = shift - begin if track.falling_mileage else -track.mileage or shift - begin
                 place = begin - shift + needed
-                text += f"; is it a mileage? shift = {needed:.9g} puts its begin at s = {place:g}"
+                text += f"; is it a mileage? shift = {needed:.9g} puts its start at s = {place:g}"
             yield Remark(key, text)
         elif key.startswith("sections.") and (begin < 0.0 or end > track.length):
             text = f"from {begin:g} to {end:g} m, partly beyond the track's {track.length:g} m"

@@ -101,7 +101,7 @@ class Signal(base.Definition):
     noise: base.NonNegative = 0.0
     """Standard deviation of normal noise of each sample [unit of the quantity]; needs `rate`"""
     seed: base.Whole = 1
-    """Seed of the noise; signals of one seed have each a noise of its own"""
+    """Seed of the noise; signals with the same seed have independent noise"""
     resolution: base.NonNegative = 0.0
     """Smallest difference of two values [unit of the quantity]; 0: as fine as numbers are"""
 
@@ -157,7 +157,7 @@ class Controller(base.Definition):
     parameters: dict[base.Name, base.Finite] = base.EMPTY_TABLE
     """Values of the function's further arguments, by name"""
     memory: Annotated[base.Count, Field(le=1_000_000)] | None = None
-    """How many numbers its argument `memory` keeps from call to call, 0 at the begin"""
+    """How many numbers its argument `memory` keeps from call to call, 0 at the beginning"""
 
     @base.check
     def _inputs_are_not_what_the_loop_gives(self) -> None:
