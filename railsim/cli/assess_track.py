@@ -15,10 +15,10 @@ SHOWN = 40
 @click.argument("recording", shell_complete=cli.names_of("track"))
 @cli.repeated("--vehicles", "Vehicles: files or names.", "F [F ...]", required=True)
 @cli.repeated("--speeds", "Speeds in m/s, or with a unit: 160km/h.", "V [V ...]", required=True)
-@cli.option("--share", "Share of a limit from which on a place is listed.", "X", float, default=0.8)
+@cli.option("--share", "Least share of a limit that is listed.", "X", float, default=0.8)
 @cli.option("--out", "Folder of the runs and tables.", "DIR", required=True)
 @cli.workers_option
-@cli.flag("--resume", "Go on where this folder was left.")
+@cli.flag("--resume", "Continue in this folder.")
 @cli.output_options()
 @cli.code_options
 def command(

@@ -11,7 +11,7 @@ from railsim.cli import common as cli
 @cli.vehicle_argument
 @cli.track_argument
 @cli.option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", cli.as_speed)
-@cli.option("--inputs", "Actuators that are commanded; default all that no controller does.", "A,B")
+@cli.option("--inputs", "Actuators that are commanded; default: all without a controller.", "A,B")
 @cli.option("--outputs", "Quantities and signals; default Q, Y, lateral.", "X,Y")
 @cli.option("--out", "The unit.", "F.fmu", required=True)
 @cli.extent_options

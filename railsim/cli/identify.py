@@ -42,7 +42,7 @@ def command(
 ) -> None:
     """Identify parameters of a vehicle from measured runs, by least squares.
 
-    The fitted vehicle file extends the original with the letter [I] for each number.
+    The fitted vehicle file extends the original and marks each number with [I].
 
     \b
     Example:

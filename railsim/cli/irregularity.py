@@ -22,7 +22,7 @@ FILES = ("irregularity.json", "irregularity.png")
 @cli.option(
     "--noise", "rms of an accelerometer in m/s2, unless MEASURED has it.", "A", float, default=0.05
 )
-@cli.option("--simulations", "Most runs for 2 km; 0: linear estimate.", "N", cli.FROM_0, default=25)
+@cli.option("--simulations", "At most N runs for 2 km; 0: linear estimate.", "N", cli.FROM_0, default=25)
 @cli.set_option
 @cli.output_options("Folder for recording, track, estimates, forces.")
 @cli.code_options
@@ -40,7 +40,7 @@ def command(
     MEASURED is a measurement file with channels sensor_acceleration:POINT:AXIS of axleboxes,
     frames or floor.  A smoother with the linearised vehicle gives alignment, level and cross level
     with the standard deviation of their errors, in D1 and D2 of EN 13848, and Q, Y and sum Y;
-    simulated runs over the estimate put it right where the contact is not linear.
+    simulated runs over the estimate correct it for the non-linear contact.
     Wavelengths that the channels do not see are named and not filled in.
 
     \b

@@ -29,7 +29,7 @@ def command(
 ) -> int:
     """Compare simulated with measured runs, section by section (EN 14363, Annex T).
 
-    One result for each measured run, in the same order; or a folder of results called as the
+    One result for each measured run, in the same order; or a folder of results named like the
     measurement files; or a study, of which the run on the same track at the same speed and load is
     taken for each.  Without results the runs are simulated.
 
