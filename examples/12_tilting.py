@@ -1,4 +1,4 @@
-"""What does tilting take off the passengers?
+"""What does tilting spare the passengers?
 
 Actuators between bogies and car body tilt the coach into a curve of 400 m at 1.5 m/s2 in the track
 plane: by the curvature ahead, which the train knows from its position, and by an accelerometer on

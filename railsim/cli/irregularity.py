@@ -22,7 +22,7 @@ FILES = ("irregularity.json", "irregularity.png")
 @cli.option(
     "--noise", "rms of an accelerometer in m/s2, unless MEASURED has it.", "A", float, default=0.05
 )
-@cli.option("--simulations", "At most N runs for 2 km; 0: linear estimate.", "N", cli.FROM_0, default=25)
+@cli.option("--simulations", "Most runs per 2 km; 0: linear estimate.", "N", cli.FROM_0, default=25)
 @cli.set_option
 @cli.output_options("Folder for recording, track, estimates, forces.")
 @cli.code_options
