@@ -202,7 +202,7 @@ class Arc(Definition):
     centre: Coordinates | None = None
     """Centre in the cam's axes [m], instead of tangency"""
     begin: Quantity | None = None
-    """Direction from the given centre to the arc's begin [rad]; by default where its rates equal
+    """Direction from the given centre to the arc's start [rad]; by default where its rates equal
     those of the arc before, on the line through both centres"""
     end: Quantity | None = None
     """The same for its end [rad]"""
