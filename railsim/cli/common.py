@@ -177,7 +177,7 @@ extent_options = together(
 
 
 def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
-    """Permit laws of one's own: all that the files name, or those of some files."""
+    """Permit user-defined laws: all that the files name, or those of some files."""
     if files:
         from railsim.laws.permission import allow
 

@@ -146,7 +146,7 @@ class MeasurementFile(FileDefinition):
     """Data: CSV (`.csv`, `.txt`), Parquet (`.parquet`), MATLAB (`.mat`) or HDF5 (`.h5`, `.hdf5`); a
     list of them is one record in several parts, one behind the other"""
     channels: Annotated[dict[base.Name, Channel], Field(min_length=1, max_length=MOST_CHANNELS)]
-    """Channels by names of one's own"""
+    """Channels by names of your choice"""
     vehicle: base.Text | None = None
     """Vehicle file or name of a shipped one, where a command gives no other"""
     track: base.Text | None = None

@@ -138,7 +138,7 @@ class Outputs(base.Definition):
     track: base.Flag = False
     """Curvature, cant, gradient and irregularities at each wheelset"""
     own: dict[base.Name, OwnOutput] | None = None
-    """Quantities by laws of one's own, by name"""
+    """Quantities by user-defined laws, by name"""
 
 
 class Settings(FileDefinition):
@@ -163,11 +163,11 @@ class Settings(FileDefinition):
     creep_law: CreepLawName = "fastsim"
     """Law of the creep forces; `table` is the full theory, tabulated"""
     laws: dict[base.Name, Law] | None = None
-    """Laws of one's own by name: Python functions, executed only with permission"""
+    """User-defined laws by name: Python functions, executed only with permission"""
     own_creep_law: LawUse | None = None
-    """Creep law of one's own, instead of `creep_law`"""
+    """User-defined creep law, instead of `creep_law`"""
     own_friction: LawUse | None = None
-    """Factor of the friction over the slip velocity by a law of one's own, instead of the track's
+    """Factor of the friction over the slip velocity by a user-defined law, instead of the track's
     `friction_falling`"""
     adhesion_curve: AdhesionRows | None = None
     """Measured curve of the law `adhesion_curve`: rows [creepage, T/(mu N)] from [0, 0] on, linear

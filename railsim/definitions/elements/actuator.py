@@ -1,4 +1,4 @@
-"""Forces that follow a command or a law of one's own."""
+"""Forces that follow a command or a user-defined law."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
@@ -103,7 +103,7 @@ class Actuator(CommandedElement):
 
 
 class LawElement(CommandedElement):
-    """A force by a law of one's own, a compiled Python function."""
+    """A force by a user-defined law, a compiled Python function."""
 
     kind: Literal["law"]
     law: Name

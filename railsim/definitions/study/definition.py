@@ -131,7 +131,7 @@ class Study(FileDefinition):
     sample: Sample | None = None
     """Random values of further keys"""
     analyses: dict[base.Name, Analysis] = base.EMPTY_TABLE
-    """What is done at each point, by a name of one's own; by default a run"""
+    """What is done at each point, by any name; by default a run"""
     optimise: Optimise | None = None
     """Variables, objectives and constraints of `railsim optimise`"""
 

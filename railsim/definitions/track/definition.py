@@ -102,7 +102,7 @@ class Track(FileDefinition, Plottable):
     irregularities: tuple[Irregularity, ...] = Field(default=(), max_length=MOST_IRREGULARITIES)
     """Displacements of the rails from their ideal positions; they add up"""
     laws: dict[base.Name, Law] | None = None
-    """Laws of one's own by name: Python functions, executed only with permission"""
+    """User-defined laws by name: Python functions, executed only with permission"""
     sections: tuple[RailSections, ...] = Field(default=(), max_length=MOST_RANGES)
     """Ranges in which the section of a rail changes, such as crossings"""
     check_rail: tuple[CheckRail, ...] = Field(default=(), max_length=MOST_CHECK_RAILS)

@@ -49,7 +49,7 @@ class Vehicle(FileDefinition, Plottable):
     """Points whose motion is recorded with `settings.outputs.sensors`, by name, beside the
     standard ones"""
     laws: dict[Name, Law] | None = None
-    """Laws of one's own by name: Python functions, executed only with permission"""
+    """User-defined laws by name: Python functions, executed only with permission"""
     signals: dict[Name, Signal] | None = None
     """What is measured during a run, by name"""
     controllers: dict[Name, Controller] | None = None

@@ -1,4 +1,4 @@
-"""Laws of one's own, signals and controllers, as vehicle files name them.
+"""User-defined laws, signals and controllers, as vehicle files name them.
 
 A law's file is read and kept with the definition as its source: results carry it, their inputs are
 told apart by it, and workers get it.  Nothing is executed here (see `railsim.laws`).
@@ -45,7 +45,7 @@ class LawUse(base.Definition):
 
 
 class OwnOutput(LawUse):
-    """A quantity of the result by a law of one's own, of other quantities at the same instant."""
+    """A quantity of the result by a user-defined law, of other quantities at the same instant."""
 
     inputs: dict[base.Name, base.Text] = base.EMPTY_TABLE
     """Arguments of the function: to each a quantity with the labels wanted, such as `Q:1:left`"""
@@ -143,7 +143,7 @@ class Signal(base.Definition):
 
 
 class Controller(base.Definition):
-    """A law of one's own that reads signals and commands actuators, at equal times."""
+    """A user-defined law that reads signals and commands actuators, at equal times."""
 
     law: base.Name
     """Name of the law in the table `laws`"""
