@@ -95,7 +95,7 @@ def command(routes: Mix, limits: str, given: cli.Given, **how: Any) -> None:
 @cli.output_options("Folder for wear.json, wear.png and the profiles.")
 @cli.allow_code_option
 def rails(traffic: Mix, given: cli.Given, **how: Any) -> None:
-    """Compute the wear of both rails of a track under a mix of traffic, updating their profiles.
+    """Compute the wear of both rails of a track under mixed traffic, updating their profiles.
 
     The mean wear over the track is removed from the profiles, so the track should have one
     curvature.  The laws are those of wheels; the wheels do not wear.  Steps are kept and continued
