@@ -133,7 +133,7 @@ def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
             by_kind[prefix].append(rest)
         else:
             key = text.partition("=")[0]
-            allowed = "a path that begins with vehicle., track. or settings."
-            faults.append(located_fault(OVERRIDE, key, "unknown beginning", allowed))
+            allowed = "the path must begin with vehicle., track. or settings."
+            faults.append(located_fault(OVERRIDE, key, "unknown prefix", allowed))
     faults.check()
     return by_kind
