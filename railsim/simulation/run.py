@@ -61,7 +61,7 @@ def simulate(
         of this run, or its states ``result.groups["state"]``, or of these ``end`` alone: then
         controllers and delays begin anew.  Either gives speed and start.
     allow_code : bool
-        Execute the laws of one's own that the files name, see `railsim.laws`.
+        Execute the user-defined laws that the files name, see `railsim.laws`.
 
     Returns
     -------

@@ -48,14 +48,16 @@ class Simulation:
 
     Parameters
     ----------
-    vehicle, track, speed, start, duration, until, settings, sink, profiles, resume, progress
-        As in `railsim.simulate`; `duration` and `until` end the run.
+    vehicle, track, speed, start, duration, until : as `railsim.simulate`
+        Inputs, start and end of the run.
+    settings, sink, profiles, resume, progress : as `railsim.simulate`
+        How it is computed.
     record : bool or str or Path
         Whether the quantities are kept at the rate of the settings: in memory, or in a file of
-        this name.  Without a record the memory stays as it is however long the run, and `result`
-        holds the peaks over all steps alone.
+        this name.  Without a record memory does not grow with the run, and `result` holds only
+        the peaks over all steps.
     allow_code : bool
-        Execute the laws of one's own that the files name, see `railsim.laws`.
+        Execute the user-defined laws that the files name, see `railsim.laws`.
 
     Raises
     ------

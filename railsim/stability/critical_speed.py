@@ -87,8 +87,8 @@ def critical_speed(
         Range of the search [m/s], or with units: ``"400 km/h"``.
     points : int
         Speeds of a bifurcation diagram; refused where there is none.
-    linearisation, amplitude, conicity
-        Of the linear critical speed, as in `railsim.modes`; given cones hold for all methods.
+    linearisation, amplitude, conicity : as `railsim.modes`
+        Of the linear critical speed; given cones hold for all methods.
     excitations : float or sequence of float
         Sizes of the disturbances from which hunting is sought: lateral displacement of a wheelset
         in the shape of the hunting mode [m].

@@ -181,13 +181,13 @@ def optimise(
     choose : int, optional
         Number of the design that is written as a vehicle; by default the design of the front that
         is nearest to the best value of each objective, scaled by the ranges of the front.
-    workers, scheduler
+    workers, scheduler : int, str
         As in `railsim.study`.
     resume : bool
         Continue although the file has changed.
     overwrite : bool
         Compute everything again.
-    progress, on_remark
+    progress, on_remark : callable
         As in `railsim.study`.
 
     Raises
