@@ -40,8 +40,10 @@ def animate(
         (`railsim.animation.mode_scene`).
     path : str or path
         ``.html``, ``.gif`` or ``.mp4``, which needs ffmpeg.
-    frames_per_second, gain : int, float
-        Of a film: pictures a second, magnification of the motion of the bodies [1].
+    frames_per_second : int
+        Of a film [1/s].
+    gain : float
+        Of a film: magnification of the motion of the bodies [1].
     overwrite : bool
         Replace a file that exists.
 

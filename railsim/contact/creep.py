@@ -95,9 +95,11 @@ def creep_force(
         Third-body reduction of Kalker's coefficients, 0 < k <= 1 [1].
     slip_reduction : float, optional
         Polach's factor for the slip area, by default equal to `reduction` [1].
-    friction_rest, friction_decay : float
+    friction_rest : float
         Friction falling with the slip velocity w = speed |xi|:
-        mu(w) = mu ((1 - rest) exp(-decay w) + rest) [1, s/m].
+        mu(w) = mu ((1 - rest) exp(-decay w) + rest) [1].
+    friction_decay : float
+        The decay in it [s/m].
     speed : float
         Speed of travel, for falling friction [m/s].
 

@@ -158,8 +158,12 @@ def contact_summary(
         Left and right.
     radii : tuple of two floats
         Rolling radii [m].
-    gauge, inclination, back_to_back : float
-        As `railsim.contact.contact_geometry` [m], [1], [m].
+    gauge : float
+        As `railsim.contact.contact_geometry` [m].
+    inclination : float
+        Of the rails [1].
+    back_to_back : float
+        Distance between the flange backs [m].
     load : float
         Vertical load of the right wheel [N].
     max_shift : float

@@ -56,7 +56,7 @@ def fmu(
     ``body_acceleration:carbody:y``; `overwrite`: whether a file of this name may be replaced;
     `**conditions`: speed, settings, start, duration, until and profiles, as in `railsim.simulate`.
     Returns: the file. Raises InputError: an actuator, signal or quantity does not exist, or the run
-    is no run. ImportError PythonFMU3 is not installed.
+    is impossible. ImportError PythonFMU3 is not installed.
     """
     wrapper = optional_package("pythonfmu3", "fmu", "'railsim[fmi]'")
     path = Path(path)

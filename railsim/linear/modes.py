@@ -290,9 +290,10 @@ def modes(
         Lateral amplitude of the wheelsets [m].
     conicity : float, optional
         Wheels replaced by straight cones of this slope [1].
-    radius, cant : float
-        Of the track on which the vehicle rolls, both negative in left-hand curves: a positive
-        cant is a higher left rail [m].
+    radius : float
+        Of the track on which the vehicle rolls, negative in left-hand curves [m].
+    cant : float
+        Positive where the left rail is higher [m].
     held : bool
         Hold the wheelsets: modes of the suspended masses alone.
     hold : sequence of str
@@ -331,7 +332,9 @@ def root_locus(
 
     Parameters
     ----------
-    vehicle, track : Vehicle, Track
+    vehicle : Vehicle
+        As in `modes`.
+    track : Track, optional
         As in `modes`.
     speeds : sequence of float or str
         [m/s], or with a unit: ``"72 km/h"``.

@@ -48,8 +48,12 @@ class Simulation:
 
     Parameters
     ----------
-    vehicle, track, speed, start, duration, until : as `railsim.simulate`
-        Inputs, start and end of the run.
+    vehicle, track : Vehicle, Track
+        Definitions, as for `railsim.simulate`.
+    speed, duration, until : as `railsim.simulate`
+        Speed and end of the run.
+    start : float
+        Arc length at which the reference body starts [m].
     settings, sink, profiles, resume, progress : as `railsim.simulate`
         How it is computed.
     record : bool or str or Path

@@ -83,12 +83,18 @@ def critical_speed(
         Whose rails, gauge, friction and support count; by default ``straight``.
     methods : str or sequence of str
         One or several of `METHODS`; the linear one is always used.
-    low, high : float or str
-        Range of the search [m/s], or with units: ``"400 km/h"``.
+    low : float or str
+        Lower end of the search [m/s], or with units: ``"20 km/h"``.
+    high : float or str
+        Its upper end.
     points : int
         Speeds of a bifurcation diagram; refused where there is none.
-    linearisation, amplitude, conicity : as `railsim.modes`
-        Of the linear critical speed; given cones hold for all methods.
+    linearisation : tangent or harmonic
+        Of the linear critical speed, as in `railsim.modes`, and so is `amplitude`.
+    amplitude : float
+        Lateral amplitude of the wheelsets [m].
+    conicity : float, optional
+        Straight cones of this slope as wheels, for all methods [1].
     excitations : float or sequence of float
         Sizes of the disturbances from which hunting is sought: lateral displacement of a wheelset
         in the shape of the hunting mode [m].

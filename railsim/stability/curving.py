@@ -206,7 +206,7 @@ def curving(
     cant : float
         Of the outer rail over the inner one [m].
     cant_deficiency : float or sequence of float
-        What is missing to the balanced cant, negative for too much [m].
+        Cant deficiency, negative for an excess of cant [m].
     friction : float or sequence of float, optional
         Coefficients of friction of both rails; by default those of the track's rails at its
         beginning, of which the result holds the mean.

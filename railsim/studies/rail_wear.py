@@ -20,7 +20,7 @@ from railsim.studies.wear_loop import Loop, Run, Wearing, WearStep, carry_out, r
 def rail_wear(
     track: Track, traffic: Sequence[tuple[Vehicle, float, float]], **how: Any
 ) -> list[WearStep]:
-    """Wear of both rails of a track under a mix of traffic, profiles an update at each step.
+    """Wear of both rails of a track under mixed traffic, with updated profiles at each step.
 
     The mean over the track is worn off: let it be of one curvature.  The wheels remain as they are.
 

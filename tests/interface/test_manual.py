@@ -1,5 +1,6 @@
 """The manual and the README are up to date: generated tables, command lines, the main job."""
 
+import inspect
 import re
 import shlex
 from importlib import import_module
@@ -73,6 +74,18 @@ def test_every_public_name_is_in_the_reference():
     for package in ("railsim", "railsim.contact", "railsim.assessment"):
         names = set(import_module(package).__all__) - {"__version__"}
         assert not [name for name in names if f"::: {package}.{name}\n" not in text]
+
+
+def test_parameters_that_share_a_line_share_their_default():
+    """The reference shows the default of the first one for all: a cant of inf, a gain of 20."""
+    grouped = re.compile(r"^ +(\w+(?:, \w+)+)(?: :|$)", re.MULTILINE)
+    for package in map(import_module, ("railsim", "railsim.contact", "railsim.assessment")):
+        public = (getattr(package, name) for name in package.__all__)
+        for thing in (one for one in public if inspect.isfunction(one)):
+            values = inspect.signature(thing).parameters
+            for line in grouped.findall(thing.__doc__):
+                shared = [values[name].default for name in line.split(", ") if name in values]
+                assert len(set(map(repr, shared))) <= 1, (thing, line)
 
 
 def test_table_of_quantities_is_up_to_date(generate):
