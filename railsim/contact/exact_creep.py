@@ -244,8 +244,10 @@ def exact_creep_force(
         Friction coefficient, > 0 [1].
     xi_x, xi_y, phi : float
         Creepages, wheel minus rail [1, 1, 1/m].
-    G, nu : float
-        Shear modulus [Pa] and Poisson's ratio [1] of wheel and rail.
+    G : float
+        Shear modulus of wheel and rail [Pa].
+    nu : float
+        Poisson's ratio [1].
     nx, ny : int
         Cells along, strips across the patch.
 
