@@ -61,9 +61,9 @@ def command(
     """
     from railsim.linear.modes import Modes, RootLocus, modes, root_locus
 
-    for option, value in (("--over", over), ("--speed", speed)):
-        if speeds is not None and value is not None:
-            raise input_error(option, "given together with --speeds", "one of the two")
+    if speeds is not None and (over is not None or speed is not None):
+        option = "--speed" if over is None else "--over"
+        raise input_error(option, "given together with --speeds", "one of the two")
     speed = 20.0 if speed is None else speed
     cli.goes_with("--linearisation harmonic", how["linearisation"] == "harmonic", "amplitude")
     coach, rails, settings = given.inputs()

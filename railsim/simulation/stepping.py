@@ -49,13 +49,11 @@ class Simulation:
     Parameters
     ----------
     vehicle, track : Vehicle, Track
-        Definitions, as for `railsim.simulate`.
-    speed, duration, until : as `railsim.simulate`
-        Speed and end of the run.
+        As in `railsim.simulate`.
     start : float
         Arc length at which the reference body starts [m].
-    settings, sink, profiles, resume, progress : as `railsim.simulate`
-        How it is computed.
+    speed, duration, until, settings, sink, profiles, resume, progress : as `railsim.simulate`
+        Speed and end of the run, and how it is computed.
     record : bool or str or Path
         Whether the quantities are kept at the rate of the settings: in memory, or in a file of
         this name.  Without a record memory does not grow with the run, and `result` holds only
