@@ -11,8 +11,6 @@ from selection import points
 
 from railsim.simulation import simulate
 
-AMPLITUDE, FREQUENCY = 6.24e-3, 5.23  # m, Hz: benchmark_vehicle1 at 80 m/s
-
 
 def limit_cycle(vehicle, speed, y):
     """Amplitude [m] and frequency [Hz] of the leading wheelset, 6 to 10 s after a start at `y`."""
@@ -30,12 +28,18 @@ def limit_cycle(vehicle, speed, y):
 
 
 @pytest.mark.slow
-@points("y", [2e-3, 4e-3], always=(0,))
-def test_hunting_of_the_benchmark_vehicle(y):
+@points(
+    ("vehicle", "speed", "y", "amplitude", "frequency", "tolerance"),
+    [
+        ("benchmark_vehicle1", 80.0, 2e-3, 6.24e-3, 5.23, 0.02),
+        ("benchmark_vehicle1", 80.0, 4e-3, 6.24e-3, 5.23, 0.02),
+        ("coach_manchester", 60.0, 4e-3, 6.43e-3, 6.84, 0.03),
+    ],
+    always=(0,),
+)
+def test_hunting_on_rigid_rails(vehicle, speed, y, amplitude, frequency, tolerance):
     """2 %: the foundation's modulus alone moves the independent model by that much."""
-    amplitude, frequency = limit_cycle("benchmark_vehicle1", 80.0, y)
-    assert amplitude == pytest.approx(AMPLITUDE, rel=0.02)
-    assert frequency == pytest.approx(FREQUENCY, rel=0.02)
+    assert limit_cycle(vehicle, speed, y) == pytest.approx((amplitude, frequency), rel=tolerance)
 
 
 def remarks(speed, until=800.0, spectrum=None, start=3e-3, **irregularity):

@@ -43,13 +43,21 @@ def curving(vehicle, radius, cant, speed, friction=None):
 
 
 @pytest.mark.usefixtures("small_contact_tables")
-@pytest.mark.parametrize("radius", [2000.0, -2000.0])
-def test_free_conical_wheelset_rolls_where_its_radii_fit_the_curve(radius):
-    """Q1: y = -3.258 mm at R 2000 m, yaw 0 +- 2 urad; computed independently, 0.5 %."""
+@pytest.mark.parametrize(
+    ("profile", "radius", "lateral"),
+    [
+        ("cone_1in20", 2000.0, -3.258e-3),
+        ("cone_1in20", -2000.0, 3.258e-3),
+        ("cone_1in40", 4000.0, -3.377e-3),
+    ],
+)
+def test_free_conical_wheelset_rolls_where_its_radii_fit_the_curve(profile, radius, lateral):
+    """Q1: displacement computed independently, 0.5 %; yaw 0 +- 2 urad."""
     speed = 20.0
     cant = speed**2 / radius / GRAVITY * 1.5
-    found, *_ = curving(test_vehicle("single_wheelset"), radius, cant, speed)
-    assert 1e3 * found[1] == pytest.approx(-3.258 * np.sign(radius), rel=5e-3)
+    wheelset = test_vehicle("single_wheelset").with_values({"wheelset.profile": profile})
+    found, *_ = curving(wheelset, radius, cant, speed)
+    assert found[1] == pytest.approx(lateral, rel=5e-3)
     assert abs(found[5]) < 2e-6
 
 
