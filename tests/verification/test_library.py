@@ -122,6 +122,20 @@ def test_stable_at_110_per_cent_of_the_admissible_speed(name):
             assert mode["damping_ratio"] > 0.0, mode["name"]
 
 
+@pytest.mark.parametrize(("name", "side"), [("wagon_three_piece_25t", 5.9), ("wagon_c62a", 5.32)])
+def test_springs_of_a_side_and_those_of_its_wedges_are_the_sources(name, side):
+    """Zhai's appendix: Ksz [MN/m] of a side, of which Ksz1 = 0.769 MN/m under the wedges."""
+    stiffness = {
+        element.name.removeprefix("front."): 1e-6 * element.definition.vertical_stiffness
+        for element in flatten(load_vehicle(name)).elements
+        if element.name.startswith(("front.bolster_spring", "front.wedges"))
+    }
+    for hand in ("right", "left"):
+        springs, wedges = stiffness[f"bolster_spring_{hand}"], stiffness[f"wedges_{hand}"]
+        assert wedges == pytest.approx(0.769)
+        assert springs + wedges == pytest.approx(side)
+
+
 # load cases ---------------------------------------------------------------------------------------
 
 
