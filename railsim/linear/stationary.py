@@ -165,7 +165,7 @@ def on_twist(
 
 def _under_full_load(begin: Callable[[], SlidingPath]) -> SlidingPath:
     """A path at its full load, in as many steps as lead there: a long one may pass a gap."""
-    for parts in (PARTS, 2):
+    for parts in (PARTS, 3, 2):
         with suppress(NotConverged):
             path = begin()
             for share in np.linspace(0.0, 1.0, parts + 1)[1:]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rig import Rig
 from scipy.integrate import quad
 from scipy.linalg import eigh
 from selection import points
@@ -231,6 +232,24 @@ def test_three_piece_bogie_turns_in_a_curve_against_the_friction_of_plate_and_si
     assert abs(moment) == pytest.approx(
         0.3 * (2.0 / 3.0 * 0.178 * plate + 0.75 * bearers), rel=0.01
     )
+
+
+def test_sliding_leaves_do_not_release_the_links():
+    """Links pushed aside keep their friction, 0.06 N, while the leaf spring moves up by 5 mm."""
+    definition = load_vehicle("wagon_uic_link").assemblies["axle"].elements["spring_and_links"]
+    law = definition.model_dump(exclude={"bodies", "point", "points", "sides", "damping"})
+    rig = Rig(**law | {"preload": [0.0, 0.0, -104e3]})
+
+    aside = np.array([0.0, 15e-3, 0.0, 0.0, 0.0, 0.0])
+    up = np.array([0.0, 0.0, -5e-3, 0.0, 0.0, 0.0])
+    time = np.linspace(0.0, 2.0, 801)
+    force = rig.path(
+        time,
+        lambda t: min(t, 1.0) * aside + max(t - 1.0, 0.0) * up,
+        lambda t: aside if t < 1.0 else up,
+    )
+    friction = force[400:, 1] - 297e3 * 15e-3
+    assert friction == pytest.approx(0.06 * 104e3, rel=5e-3)  # a step more or less of stuck pads
 
 
 def test_c62a_stands_higher_when_empty_by_its_bolster_springs():
