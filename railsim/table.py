@@ -330,3 +330,12 @@ def _plain(cell: Any) -> Any:
     value = cell.value if isinstance(cell, Amount) else cell
     value = value.item() if hasattr(value, "item") else value  # numbers of numpy
     return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def html_of(parts: Iterable[str | Table]) -> str:
+    """Return texts and tables, from top to bottom, for pages and notebooks."""
+    return "\n".join(
+        f"<p>{escape(printable(part))}</p>" if isinstance(part, str) else part.html()
+        for part in parts
+        if part
+    )

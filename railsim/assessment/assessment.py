@@ -15,6 +15,7 @@ from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.plottable import draw_figure
+from railsim.table import Table, html_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -111,6 +112,21 @@ class Assessment:
                 if before is None or row.rank > before[1].rank:
                     worst[row.criterion.name] = report, row
         return worst
+
+    def __repr__(self) -> str:
+        words = (self.vehicle, self.standard, self.verdict)
+        return f"<Assessment: {', '.join(filter(None, words))}>"
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self._lines()))
+
+    def _repr_html_(self) -> str:
+        return html_of(self._lines())
+
+    def _lines(self) -> list[str | Table]:
+        from railsim.assessment.tables import assessment_lines
+
+        return assessment_lines(self, quiet=False)
 
     def plot(self, path: str | Path | None = None, *, overwrite: bool = False) -> "Figure":
         """Draw estimates against limits, comfort or wear; also into the file of `path`."""

@@ -3,11 +3,9 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from typing import Any
 
-from railsim.table import Table
-from railsim.text import printable
+from railsim.table import Table, html_of
 
 Parts = list[str | Table]
 
@@ -31,11 +29,7 @@ class Description:
         return "\n".join(str(part) for part in self.parts)
 
     def _repr_html_(self) -> str:
-        return "\n".join(
-            f"<p>{escape(printable(part))}</p>" if isinstance(part, str) else part.html()
-            for part in self.parts
-            if part
-        )
+        return html_of(self.parts)
 
 
 def either(pair: Sequence[Any]) -> str:

@@ -16,7 +16,7 @@ from railsim.assessment import Assessment, assess, running
 from railsim.assessment.comfort import MeanComfort, event_comfort
 from railsim.assessment.comfort_report import PointComfort, shock_remark
 from railsim.assessment.safety import flange_angle
-from railsim.assessment.tables import assessment_lines, tables
+from railsim.assessment.tables import tables
 from railsim.assessment.wear import wear_law
 from railsim.cli import main
 from railsim.cli.assess import FILES
@@ -434,10 +434,12 @@ def test_remarks_of_several_runs_name_theirs():
     lifts = Result({n: run[n] for n in run}, run.quantities, run.coordinates, facts, run.profiles)
     for standard in ("safety", "en14363"):
         (found,) = assess({"calm": run, "lifts": lifts}, standard)
-        lines = [str(line) for line in assessment_lines(found, quiet=False)]
+        lines = str(found).splitlines()
+        assert repr(found).startswith(f"<Assessment: {found.vehicle}, {standard}")
+        assert "<p>remark: lifts: A wheel lifts off.</p>" in found._repr_html_()
         assert "remark: lifts: A wheel lifts off." in lines
         (found,) = assess({"first": lifts, "second": lifts}, standard)
-        lines = [str(line) for line in assessment_lines(found, quiet=False)]
+        lines = str(found).splitlines()
         assert "remark: 2 runs: A wheel lifts off." in lines
 
 
