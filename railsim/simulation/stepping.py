@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 import numpy as np
 
@@ -447,6 +447,9 @@ class Simulation:
         return self._seen
 
     # states
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a Simulation cannot be pickled; its `state` can")
 
     @property
     def state(self) -> SavedState:

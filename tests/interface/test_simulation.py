@@ -152,6 +152,8 @@ def test_a_state_restored_has_the_same_bits(coach, track):
     sim.step(0.1)
     sim.set("push", 5e3)
     sim.step(0.0107)
+    with pytest.raises(TypeError, match="its `state` can"):
+        pickle.dumps(sim)
     saved = pickle.loads(pickle.dumps(sim.state))
 
     def onwards():
