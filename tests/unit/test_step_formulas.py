@@ -252,7 +252,8 @@ def division(rates=(0.0, 0.0), most=8, last=1e-3, implicit=0.0, elastic=0, near=
         ({"rates": (0.08, 0.095), "near": 1}, (1, 3)),  # three times as much where rails change
         # behind a part of a long step on rigid rails: parts at most twice as long, and a limit of
         # half a part's share
-        ({"last": 0.2e-3, "implicit": 1.0}, (0, 3)),
+        ({"last": 0.21e-3, "implicit": 1.0}, (0, 3)),
+        ({"last": 0.25e-3, "implicit": 1.0}, (0, 2)),
         ({"last": -0.2e-3, "implicit": 1.0}, (0, 3)),
         ({"last": 0.01e-3, "implicit": 1.0}, (0, 8)),
         ({"last": 0.6e-3, "implicit": 1.0}, (-1, 2)),

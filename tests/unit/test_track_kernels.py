@@ -70,9 +70,11 @@ from railsim.kernels.rails import (
     CHANGE_ROLL,
     CHANGE_Y,
     CHANGE_Z,
+    COSINE,
     PLANE_SIZE,
     RAIL_SIZE,
     RATE_CHANGE_SIZE,
+    SINE,
 )
 from railsim.kernels.slope_adaptation import LMS_SIZE
 from railsim.kernels.state import ARC_LENGTH, LAST_STEP, SPEED, smoothed_begin
@@ -85,6 +87,12 @@ from railsim.kernels.support import (
     C_PAD_Y,
     C_PAD_Z,
     DOF,
+    ERROR_Y,
+    ERROR_Z,
+    F_Y,
+    F_Z,
+    FOOT_Y_STIFFNESS,
+    FOOT_Z_STIFFNESS,
     HALF_BASE,
     I_SLEEPER,
     K_BALLAST_ROLL,
@@ -92,23 +100,28 @@ from railsim.kernels.support import (
     K_BALLAST_Z,
     K_PAD_Y,
     K_PAD_Z,
+    L_PATCHES,
+    L_Y_Y,
+    L_Z_Y,
     LMS,
     M_RAIL,
     M_SLEEPER,
     MEAN_CHANGE,
     MEAN_RATE,
     PADS,
+    PATCHES,
     PENDING,
     RATE,
     SKIP,
     STEP_RATIO,
+    STIFFNESS,
     SUPPORT_COLUMNS,
     SUPPORT_ROW,
     SUPPORT_SIZE,
     SUPPORT_STEP,
     URGENT,
 )
-from railsim.kernels.system import HORIZON, N_EVENTS, N_STEPPING
+from railsim.kernels.system import ALL_WHEELS, HORIZON, N_EVENTS, N_STEPPING, RATES_SIZE
 from railsim.kernels.track_frame import TrackTables
 
 SIDES = np.array([-1.0, 1.0])
@@ -511,3 +524,141 @@ def test_forces_of_patches_on_their_wheels_and_what_is_told_of_them(plain):
         slip = patch[PATCH_SPEED, k] / speed * patch[[XI_X, XI_Y, PHI], k]
         found = work.wheel[0, side, [W_NORMAL, W_XI_X, W_XI_Y, W_PHI, W_C_Y, W_C_Z]]
         assert found == pytest.approx([patch[NORMAL, k], *slip, *patch[[C_Y, C_Z], k]])
+
+
+def tracks_under_two_wheelsets(seed, plain, **about):
+    """System, work arrays and state of two wheelsets' tracks, at random; nothing waits."""
+    random = np.random.default_rng(seed)
+    support_row = random.uniform(0.5, 2.0, SUPPORT_ROW)
+    system = Record(
+        bodies=Record(kind=np.zeros(3)), internal=Record(kind=np.zeros(0)),
+        contact=Record(transient=0, body=np.array([2, 0]), load=np.array([2.0, 3.0])),
+        support=Record(row=support_row, **{"sleeper": 1, "massless": 0, "elastic": 1} | about),
+    )  # fmt: skip
+    for module in (support, slope_adaptation, support_step):
+        plain(module)
+    begin = support.support_begin(system)
+    work = Record(
+        support=random.uniform(0.1, 0.4, (2, 2, SUPPORT_COLUMNS)),
+        support_step=random.uniform(0.5, 2.0, (2, SUPPORT_STEP)),
+        wheel=random.normal(size=(2, 2, WHEEL_COLUMNS)), plane=random.normal(size=(2, PLANE_SIZE)),
+        rail_force=random.normal(size=(3, RATES_SIZE)), counts=np.zeros(8, int),
+        rail_motion=np.zeros((2, 2, 4)),
+    )  # fmt: skip
+    state = random.normal(size=begin + 2 * SUPPORT_SIZE)
+    return system, work, state, state[begin:].reshape(2, SUPPORT_SIZE)
+
+
+def test_forces_that_rails_will_have_are_linear_in_how_they_yield(plain):
+    """The rails of the first wheelset wait for the step: Y, Q and the wheelset's forces change.
+
+    A wheel in the air has no slopes and no place where its forces act.
+    """
+    system, work, state, tracks = tracks_under_two_wheelsets(31, plain)
+    h, g, K, D = 2e-2, 0.4, support.K, support.D
+    tracks[:, STEP_RATIO] = g
+    work.support[0, 1, [*range(K, K + 6), *range(D, D + 6), STIFFNESS]] = 0.0
+    load, factors = work.support_step[:, :DOF].copy(), work.support_step[0, [PADS, BALLAST]]
+    before = [array.copy() for array in (work.support, work.wheel, work.rail_force)]
+    wheels, waits = support_step.paired_numbers(0, 2), np.array([1.0, 1, 0, 0] * 2)
+    with np.errstate(invalid="ignore"):  # 0/0 of the wheel in the air
+        support_step.extrapolate_forces(system, work, state, wheels, waits, h)
+    mass, damping, stiffness = matrices(system.support.row, *factors)
+    contact = before[0][0, 0]
+    own = contact[[[K, K + 1], [K + 3, K + 4]]], contact[[[D, D + 1], [D + 3, D + 4]]]
+    stiffness[:2, :2] += own[0]
+    damping[:2, :2] += own[1]
+    c = 1.0 + g
+    r = np.linalg.solve(c * c / h * mass + c * damping + h * stiffness, load[0])
+    f = -(h * own[0] + c * own[1]) @ r[:2]
+    forces, wheels, wheelsets = (
+        now - then
+        for now, then in zip((work.support, work.wheel, work.rail_force), before, strict=True)
+    )
+    assert forces[0, 0, [F_Y, F_Z]] == pytest.approx(f)
+    assert wheels[0, 0, [W_Y, W_Q]] == pytest.approx(f)
+    sine, cosine = work.plane[0, [SINE, COSINE]]
+    foot = contact[[FOOT_Y_STIFFNESS, FOOT_Z_STIFFNESS]] / contact[STIFFNESS]
+    across, up = np.array([[cosine, -sine], [sine, cosine]]) @ f
+    moment = foot[0] * f[1] - foot[1] * f[0]
+    assert wheelsets[2, 1:4] == pytest.approx([-across, -up, -moment])
+    assert np.count_nonzero(wheelsets) == 3
+    assert np.count_nonzero(forces) == np.count_nonzero(wheels) == 2
+
+
+@pytest.mark.parametrize("massless", [0, 1])
+@pytest.mark.parametrize(
+    ("shares", "expected"),  # of the load: y and z, left and right; waits, rests, moves at once
+    [
+        ([0.0, 0.0, 1e-4, -1e-4], (0, 1, 0)),
+        ([0.0, 0.0, 0.0, -3e-4], (1, 1, 0)),
+        ([3e-4, 0.0, 0.0, 0.0], (1, 1, 0)),
+        ([3e-3, 1e-2, 0.0, -1.9e-2], (1, 1, 0)),
+        ([-5e-3, 0.0, 0.0, 0.0], (0, 0, 1)),
+        ([0.0, 0.0, 3e-3, 2.1e-2], (0, 0, 1)),
+    ],
+)
+def test_imbalances_wait_or_are_corrected_by_their_shares_of_the_load(
+    shares, expected, massless, monkeypatch, plain
+):
+    """Half as much counts in half a step; nothing moves when no evaluation remains."""
+    system, work, state, tracks = tracks_under_two_wheelsets(32, plain, massless=massless)
+    tracks[:, ACCELERATION : ACCELERATION + DOF] = acceleration = np.arange(DOF) - 2.0
+    inertia = matrices(system.support.row, 1.0, 1.0)[0] @ acceleration * (1 - massless)
+    given = np.zeros((4, DOF))
+    given[0, :4] = 0.5 * 2.0 * np.array(shares)
+    monkeypatch.setattr(support_step, "imbalance", lambda *_: in_lanes(given + inertia))
+    wheels = support_step.paired_numbers(0, 2)
+    urgent = support_step.classify_imbalance(system, work, state, wheels, 0.5, 3)
+    assert tuple(work.support_step[0, [PENDING, SKIP, URGENT]]) == expected
+    assert tuple(work.support_step[1, [PENDING, SKIP, URGENT]]) == (0, 1, 0)
+    assert urgent == expected[2]
+    np.testing.assert_allclose(work.support_step[:, :DOF], given[:2], atol=1e-12)
+    errors = work.support[:, :, [ERROR_Y, ERROR_Z]].reshape(2, 4)
+    np.testing.assert_allclose(errors, given[:2, :4], atol=1e-12)
+    work.counts[ALL_WHEELS] = 1  # the contacts of all are evaluated
+    assert not support_step.classify_imbalance(system, work, state, wheels, 0.5, 0)
+    waits = float(max(expected[0], expected[2]))
+    assert tuple(work.support_step[0, [PENDING, SKIP, URGENT]]) == (waits, 0, 0)
+
+
+def test_slopes_that_were_learnt_count_with_the_same_patches_alone(plain):
+    """Forces on the rails are those of the wheels; what is not evaluated again keeps its slopes."""
+    system, work, state, tracks = tracks_under_two_wheelsets(33, plain)
+    learnt = tracks[:, LMS : LMS + 2 * LMS_SIZE].reshape(2, 2, LMS_SIZE)
+    learnt[..., L_PATCHES] = work.support[..., PATCHES] = 3.0
+    work.support[0, 1, PATCHES], work.support_step[:, SKIP] = 2.0, [0.0, 1.0]
+    before = work.support.copy()
+    support.add_lms_slopes(system, work, state)
+    expected = before.copy()
+    expected[..., [F_Y, F_Z]] = work.wheel[..., [W_Y, W_Q]]
+    expected[0, 0, [support.K, support.K + 3]] += learnt[0, 0, [L_Y_Y, L_Z_Y]]
+    np.testing.assert_allclose(work.support, expected)
+
+
+@pytest.mark.parametrize("about", [{}, {"massless": 1}, {"sleeper": 0}, {"elastic": 0}])
+def test_tracks_accelerate_by_what_is_left_of_their_forces(about, plain):
+    """M u'' = F - C u' - K u; over 100 kg without masses; nothing of sleepers where none are."""
+    system, work, state, tracks = tracks_under_two_wheelsets(34, plain, **about)
+    derivative = np.zeros_like(state)
+    support.set_support_rates(system, work, state, derivative)
+    found = derivative[-2 * SUPPORT_SIZE :].reshape(2, SUPPORT_SIZE)
+    kept = DOF if about.get("sleeper", 1) else 4
+    if about.get("elastic", 1):
+        for w, track in enumerate(tracks):
+            M, C, K_ = matrices(system.support.row, *work.support_step[w, [PADS, BALLAST]])
+            load = np.array([*work.support[w, :, [F_Y, F_Z]].T.ravel(), 0.0, 0.0, 0.0])
+            u, rate = track[:DOF].copy(), track[RATE : RATE + DOF].copy()
+            mass = 100.0 * np.ones(DOF) if about.get("massless") else np.diag(M)
+            u[kept:] = rate[kept:] = 0.0
+            assert found[w, :kept] == pytest.approx(rate[:kept])
+            if kept == DOF:
+                expected = (load - C @ rate - K_ @ u) / mass
+                assert found[w, RATE : RATE + DOF] == pytest.approx(expected)
+        support.set_rail_motions(system, work, state)
+        at = [0, 1, RATE, RATE + 1]
+        motion = [[track[at], track[np.array(at) + 2]] for track in tracks]
+        np.testing.assert_array_equal(work.rail_motion, motion)
+    assert not found[:, kept:DOF].any()
+    assert not found[:, RATE + kept : RATE + DOF].any()
+    assert about.get("elastic", 1) or not found.any()
