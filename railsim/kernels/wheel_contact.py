@@ -158,7 +158,7 @@ def add_normal_contact(system, work, speed, state):
         f_y, f_z = force[b, 1], force[b, 2]
         along = plane[w, ROLL_SLOPE] * (f_y * z - f_z * y - force[b, 3])
         f_y, f_z = cosine * f_y - sine * f_z, sine * f_y + cosine * f_z
-        force[b, 0] += along - f_y * plane[w, SLOPE_Y] - f_z * slope - force[b, 3] * bend * yaw
+        force[b, 0] += along - f_y * plane[w, SLOPE_Y] - f_z * slope + force[b, 3] * bend * yaw
         force[b, 1] = f_y
         force[b, 2] = f_z
         force[b, 5] += slope * force[b, 3]
@@ -313,8 +313,10 @@ def add_section_contact(system, work, w, side, state, wheel, highest, s, piece, 
                 k = patch * LOOK_UP_SIZE
                 shear, g_y = rails.shear[0], work.look_up[k + G_Y]
                 work.look_up[k] += d_y * g_y + d_roll * (work.look_up[k + G_ROLL] + shear * g_y)
-                if d_y != 0.0:  # beyond the tables the stiffness does not change any more
-                    for y, roll in ((K_Y, K_ROLL), (K2_Y, K2_ROLL)):
+                for y, roll in ((K_Y, K_ROLL), (K2_Y, K2_ROLL)):
+                    if d_roll != 0.0:  # beyond the tables the stiffness does not change any more
+                        work.look_up[k + roll] = -shear * work.look_up[k + y]
+                    if d_y != 0.0:
                         work.look_up[k + roll] += shear * work.look_up[k + y]
                         work.look_up[k + y] = 0.0
                 subtract_height(work.look_up, k, bump, patch, shear)
