@@ -117,13 +117,14 @@ def test_every_kernel_module_is_in_the_table_of_the_manual():
 USUAL = {
     "G": 82e9, "nu": 0.28, "load": 60e3, "radius": 0.46, "start": 0.0, "gauge": 1.435,
     "back_to_back": 1.36, "inclination": 1.0 / 40.0, "tape_circle_distance": 1.5,
+    "allow_code": False,
 }  # fmt: skip
 
 
 def test_defaults_that_are_repeated_are_the_same_everywhere():
     others, count = [], 0
     for name, function in functions():
-        if not name.startswith(("contact/", "simulation/", "studies/")):
+        if not name.startswith(("contact/", "simulation/", "studies/", "fmi/")):
             continue
         arguments = function.args
         last = arguments.args[len(arguments.args) - len(arguments.defaults) :]

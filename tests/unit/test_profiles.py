@@ -10,7 +10,7 @@ from profile_files import bare, csv_m, csv_mm, miniprof, points, simpack
 from railsim.contact import build_contact_table, contact_geometry
 from railsim.contact.table import TableGrid
 from railsim.errors import InputError
-from railsim.profiles import Profile, load_profile
+from railsim.profiles import Profile, load_profile, recognition
 from railsim.profiles.builtin import DEFINITIONS, RAIL_HEADS, S1002_SECTIONS, cone
 
 WHEEL, RAIL = points("S1002"), points("60E1")
@@ -193,6 +193,16 @@ def test_outlier_far_beyond_the_noise_is_left_out(tmp_path, name, at, height):
     profile = load_profile(written(tmp_path, "p.csv", csv_mm(y, z)))
     assert f"1 outliers left out (line {at + 2})" in profile.notes
     assert same_contact(profile, name) < 5e-6
+
+
+@pytest.mark.parametrize("find", [recognition._spike, recognition._small_outlier])
+def test_an_outlier_is_the_same_wherever_a_profile_stands(find):
+    """Moved, mirrored, upside down and on end."""
+    y, z = (1e-3 * x for x in points("S1002"))
+    z[400] += 3e-3 if find is recognition._spike else 2.5e-4
+    for turned in ((y, z), (y + 0.4, z + 0.3), (y - 0.4, z - 0.3), (-y, z), (y, -z), (z, y)):
+        assert find(*turned) == 400
+    assert find(y[::-1], z[::-1]) == len(y) - 401
 
 
 def test_edges_of_worn_rails_are_no_outliers(tmp_path):

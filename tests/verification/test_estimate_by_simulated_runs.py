@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.signal import butter, freqs
 
 import railsim
 from railsim.definitions.excitations.base import CHANNELS
+from railsim.definitions.measurement import Channel
 from railsim.observation import Assumed, simulated
 from railsim.observation.estimate import _merge_ranges
 from railsim.observation.innovations import Powers, likely_sizes, spectra_of
@@ -133,6 +135,46 @@ def test_a_run_on_track_that_differs_from_place_to_place_begins_at_its_place(cha
     run = SimulatedRun(coach, track.replace(**changes), piece, {}, [])
     assert not run.is_steady
     assert run._start == pytest.approx(400.0)
+
+
+@pytest.mark.parametrize("widening", [None, [[0.0, 0.01]]])
+def test_readings_and_forces_are_those_of_the_run_at_the_places_of_its_piece(monkeypatch, widening):
+    """Each by its name, wave by wave; an amplifier is as late in the run as in the record."""
+    track, grid = railsim.load_track("straight"), 500.0 + STEP * np.arange(N)
+    track = track.replace(gauge_widening=widening) if widening else track
+    moved = 0.0 if widening else 400.0  # where all places are alike a run begins at 0
+    time = np.arange(0.0, 40.0, 1.0 / 400.0)
+    s = 400.0 + 20.0 * time - moved
+    lengths = {
+        "axle.y": 11.0, "axle.z": 13.0, "axle.roll_rate": 17.0, "lateral.2": 19.0, "Q.1.left": 23.0,
+        "Q.2.right": 29.0, "Y.1.right": 31.0, "sum_Y.2": 37.0,
+    }  # fmt: skip
+    waves = {name: np.sin(2.0 * np.pi * (s + moved) / L) for name, L in lengths.items()}
+
+    class Run(dict):
+        status = "complete"
+
+        def series(self, name, sensor, axis=None):
+            return waves[f"{sensor}.{axis or 'roll_rate'}"]
+
+    empty = np.full((len(s), 2, 2), np.nan)
+    Q, Y, sums, lateral = empty.copy(), empty.copy(), empty[..., 0].copy(), empty[..., 0].copy()
+    Q[:, 0, 0], Q[:, 1, 1], Y[:, 0, 1] = waves["Q.1.left"], waves["Q.2.right"], waves["Y.1.right"]
+    sums[:, 1], lateral[:, 1] = waves["sum_Y.2"], waves["lateral.2"]
+    run = Run(time=time, distance=s, Q=Q, Y=Y, sum_Y=sums, wheelset_lateral=lateral)
+    monkeypatch.setattr(simulated, "simulate", lambda *_, **__: run)
+    piece = Piece(grid, np.zeros((0, N)), np.zeros((0, N), dtype=bool), np.full(N, 20.0), 500.0)
+    late = Channel(quantity="sensor_acceleration:axle:y", low_pass=4.0)
+    plain = Channel(quantity="sensor_acceleration:axle:z")
+    outputs = {name: late if name == "axle.y" else plain for name in list(lengths)[:4]}
+    coach = railsim.load_vehicle("coach_manchester")
+    read = SimulatedRun(coach, track, piece, outputs, list(lengths)[4:])(np.zeros((4, N)))
+    found = [*read.channels, *read.forces]
+    inside, butterworth = slice(80, -80), freqs(*butter(4, 4.0, analog=True), worN=[20.0 / 11.0])
+    for (name, length), values in zip(lengths.items(), found, strict=True):
+        answer = butterworth[1][0] if name == "axle.y" else 1.0
+        expected = (answer * np.exp(2j * np.pi * grid / length)).imag
+        assert values[inside] == pytest.approx(expected[inside], abs=0.01), name
 
 
 @pytest.mark.parametrize(("widening", "begin"), [(None, 100.0), ([[0.0, 0.01]], 500.0)])
