@@ -89,6 +89,22 @@ def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path, undra
     assert [path.stat().st_mtime_ns for path in kept] == before  # not computed again
 
 
+def test_progress_of_a_map_counts_the_points_that_were_stored(monkeypatch):
+    """From their share on it rises by a point each to the whole."""
+    points, seen = [stability_map.MapPoint({}, None, None, None)] * 4, []
+    paths = iter(range(4))
+    monkeypatch.setattr(stability_map, "checked", lambda *_, **__: None)
+    monkeypatch.setattr(stability_map, "_stored_path", lambda *_: next(paths))
+    monkeypatch.setattr(stability_map, "stored_record", lambda at, _: {} if at == 2 else None)
+    monkeypatch.setattr(stability_map, "write_record", lambda *_: None)
+    monkeypatch.setattr(stability_map, "_compute", lambda waiting, *_: ((k, {}) for k in waiting))
+    stability_map.stability_map(
+        points, {"linearisation": "tangent", "amplitude": 3e-3}, folder=None, workers=1,
+        overwrite=False, progress=seen.append, on_remark=str,
+    )  # fmt: skip
+    assert seen == [0.25, 0.5, 0.75, 1.0]
+
+
 def test_map_that_is_interrupted_while_it_is_drawn_goes_on(tmp_path, monkeypatch, undrawn):
     """Its points are kept; a record alone would refuse the command, `--overwrite` begin anew."""
     folder = tmp_path / "map"

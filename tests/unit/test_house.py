@@ -114,17 +114,18 @@ def test_every_kernel_module_is_in_the_table_of_the_manual():
 
 
 # steel; standard gauge with wheels 1360 mm apart and rails at 1:40; runs begin at 0
+SHARED = "contact/", "simulation/", "studies/", "fmi/", "animation/"
 USUAL = {
     "G": 82e9, "nu": 0.28, "load": 60e3, "radius": 0.46, "start": 0.0, "gauge": 1.435,
     "back_to_back": 1.36, "inclination": 1.0 / 40.0, "tape_circle_distance": 1.5,
-    "allow_code": False,
+    "allow_code": False, "frames_per_second": 20,
 }  # fmt: skip
 
 
 def test_defaults_that_are_repeated_are_the_same_everywhere():
     others, count = [], 0
     for name, function in functions():
-        if not name.startswith(("contact/", "simulation/", "studies/", "fmi/")):
+        if not name.startswith(SHARED):
             continue
         arguments = function.args
         last = arguments.args[len(arguments.args) - len(arguments.defaults) :]

@@ -205,6 +205,13 @@ def test_an_outlier_is_the_same_wherever_a_profile_stands(find):
     assert find(y[::-1], z[::-1]) == len(y) - 401
 
 
+def test_points_far_apart_show_no_small_outlier():
+    """Four steps of 1.2 mm are no longer a neighbourhood, along a tread as along a face."""
+    y, z = (1e-3 * x[::6].copy() for x in points("S1002"))
+    z[66] += 1e-3
+    assert recognition._small_outlier(y, z) is recognition._small_outlier(z, y) is None
+
+
 def test_edges_of_worn_rails_are_no_outliers(tmp_path):
     path = written(tmp_path, "rail.csv", csv_mm(*side_cut(6.0, 0.0)))
     assert not any("outlier" in note for note in load_profile(path, "rail").notes)
