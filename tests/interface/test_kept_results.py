@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tracemalloc
 from dataclasses import replace
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -24,6 +25,7 @@ from railsim.notation import QUANTITIES
 from railsim.result import MemorySink, Result, open_run
 from railsim.result.export import export, selected
 from railsim.result.hdf5 import Storage, write
+from railsim.studies.outcome import Outcome
 
 RUN = "coach_manchester_curve_r250_10"
 
@@ -266,3 +268,17 @@ def test_missing_package_is_named_and_no_file_begun(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="pip install pandas pyarrow"):
         export(example_result(duration=1.0), tmp_path / "r.parquet")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_only_some_runs_were_given_is_a_coordinate_of_them():
+    """A value and none are two; what all runs have alike is none."""
+    pandas = pytest.importorskip("pandas")
+    columns = {"name": ["a", "b"], "speed": [10.0] * 2, "seed": [1.0, np.nan], "Q_peak": [5.0, 6.0]}
+    outcome = SimpleNamespace(
+        to_dataframe=lambda: pandas.DataFrame(columns), _labels=lambda: ["speed", "seed"]
+    )
+    data = Outcome.to_xarray(outcome)
+    assert dict(data.sizes) == {"run": 2}
+    assert "speed" not in data.coords
+    assert list(data.seed.isnull()) == [False, True]
+    assert list(data.Q_peak) == [5.0, 6.0]

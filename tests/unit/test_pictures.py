@@ -13,7 +13,7 @@ from matplotlib.quiver import Quiver
 
 from railsim.contact.creep import creep_force
 from railsim.contact.creep_curves import CASES, Patch
-from railsim.plot import contact, creep, modes
+from railsim.plot import contact, creep, modes, recording
 from railsim.profiles.profile import Profile
 
 
@@ -345,3 +345,24 @@ def test_smoothing_is_drawn_along_the_normal_in_micrometres(slope):
     found = curves(axes)
     assert len(found) == 2
     assert found[0] == pytest.approx(np.stack((1e3 * y, np.full(41, 5.0)), axis=1))
+
+
+@pytest.mark.parametrize(
+    ("step", "length", "named"),
+    [
+        (0.25, 76.0, ["D1"]),
+        (0.25, 209.0, ["D1"]),
+        (0.25, 211.0, ["D1", "D2"]),
+        (1.45, 300.0, ["D1", "D2"]),
+        (1.55, 300.0, ["D2"]),
+        (12.4, 900.0, ["D2"]),
+        (12.6, 900.0, []),
+        (0.25, 74.0, []),
+    ],
+)
+def test_a_recording_shows_the_bands_that_its_points_resolve(step, length, named):
+    """Two points in the shortest wave, three of the longest ones in it."""
+    s = np.arange(0.0, length, step)
+    rows = np.column_stack([s, np.sin(s / 3.0)])
+    words = recording._deviations(rows, lambda columns: columns[0])
+    assert [name for name in ("D1", "D2", "D3") if f"{name} " in words] == named

@@ -25,7 +25,16 @@ from railsim.plot.stability import bifurcation_figure
 from railsim.profiles import load_profile
 from railsim.stability import continuation, vehicle_flow
 from railsim.stability import motion as motion_of
-from railsim.stability.branches import THRESHOLD, Branch, Limit, Point, first_beyond, lowest_of
+from railsim.stability import ramp as ramp_of
+from railsim.stability.branches import (
+    RESOLUTION,
+    THRESHOLD,
+    Branch,
+    Limit,
+    Point,
+    first_beyond,
+    lowest_of,
+)
 from railsim.stability.continuation import settled_to
 from railsim.stability.critical_speed import (
     _by_continuation,
@@ -1160,3 +1169,22 @@ def test_rest_is_not_called_stable_where_hunting_is_named_after_the_body():
         wagon, railsim.load_track("straight"), speed=90.0, duration=2.0, settings=settings
     )
     assert np.abs(run["wheelset_lateral"]).max() > 5e-3
+
+
+@pytest.mark.parametrize("fold", [41.03, 43.0, 44.2, 49.99])
+def test_the_lowest_sustained_speed_is_sought_between_those_that_hunt_on_a_ramp(fold, monkeypatch):
+    """Below the slowest state that hunts, or above it up to the fastest, and never beyond that."""
+    tried = []
+
+    def sustain(_motion, _state, speed):
+        tried.append(speed)
+        return Point(speed, 5e-3, 1.0) if speed >= fold else None
+
+    monkeypatch.setattr(ramp_of, "sustain", sustain)
+    monkeypatch.setattr(ramp_of, "at_speed", lambda _motion, state, *_: state)
+    speeds = (50.0, 47.0, 44.0, 41.0)
+    points = [Point(speed, 5e-3 if speed > 43.5 else 0.0, 1.0) for speed in speeds]
+    found = ramp_of._lowest(None, points)
+    assert fold <= found.speed <= fold + RESOLUTION
+    assert max(tried) <= 50.0
+    assert ramp_of._lowest(None, points[3:]) is None

@@ -17,7 +17,7 @@ import railsim
 from railsim.identification.derivatives import Derivative, Sensitivity, _central, _forward
 from railsim.identification.fit import _counting, _solve
 from railsim.identification.identified import Channel
-from railsim.identification.parameters import Parameter
+from railsim.identification.parameters import Parameter, _parse
 from railsim.identification.problem import Problem, Workers
 from railsim.identification.residuals import Form, whiteness
 from railsim.identification.runs import PreparedRun
@@ -389,6 +389,29 @@ def test_runs_of_the_first_search_by_a_part_count_with_the_others(monkeypatch):
     assert found.simulations == told[-1] == len(calls)
     assert told == sorted(told)
     assert found.factors == pytest.approx(list(TRUE.values()), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("text", "taken"),
+    [
+        ("a:0.5:2", True), ("a:0.01:1.01", True), ("a:0:2", False), ("a:-1:2", False),
+        ("a:0.5:1", False), ("a:1:2", False), ("a:1.1:2", False), ("a:0.5:0.9", False),
+        ("wheel:S1002:S1002", True), ("wheel:S1002:S1002:0:1", True),
+        ("wheel:S1002:S1002:0.2:0.4", True), ("wheel:S1002:S1002:-0.01:1", False),
+        ("wheel:S1002:S1002:0:1.01", False), ("wheel:S1002:S1002:0.4:0.4", False),
+        ("wheel:S1002:S1002:0.4:0.2", False), ("a:0.5:2:0.1", True), ("a:0.5:2:0", False),
+        ("a:0.5", False), ("a:0.5:2:0.1:3", False),
+    ],
+)  # fmt: skip
+def test_bounds_of_factors_are_around_1_and_of_shares_from_0_to_1(text, taken):
+    if taken:
+        numbers = [float(x) for x in text.split(":") if x.replace(".", "").isdigit()]
+        found = _parse(text)
+        assert (found.low, found.high) == tuple(numbers[:2] or (0.0, 1.0))
+        assert found.spread == (numbers[2] if len(numbers) > 2 else None)
+    else:
+        with pytest.raises(ValueError, match="bounds|SPREAD|number"):
+            _parse(text)
 
 
 def test_a_factor_lies_between_a_tenth_and_ten_where_nothing_is_said():
