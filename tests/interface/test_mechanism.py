@@ -429,23 +429,6 @@ def test_redundant_joint_is_named(write, capsys):
     assert "b, c" in line
 
 
-def test_joints_that_are_redundant_twice_are_all_named(write, capsys):
-    """Both parts by themselves, whichever vectors span what holds nothing."""
-    text = FOUR_BAR.format(ground=1.0, crank=0.4, coupler=1.0, rocker=0.4, start=1.0, end=2.0)
-    for body, (a, b, c) in (("third", "abc"), ("fourth", "def")):
-        text += (
-            f"[bodies.{body}]\npoints = {{ pin = [0.0, 0.0], end = [0.4, 0.0] }}\n"
-            f"[start.{body}]\nx = 0.5\nangle = 1.0\n"
-            f'[joints.{a}]\nlink = ["crank.end", "{body}.end"]\nlength = 0.5\n'
-            f'[joints.{b}]\nlink = ["ground.left", "{body}.pin"]\nlength = 0.5\n'
-            f'[joints.{c}]\nlink = ["crank.pin", "{body}.pin"]\nlength = 0.5\n'
-        )
-    (line,) = refused(capsys, write(text))
-    assert "hold the same freedom twice" in line
-    for name in ("b", "c", "e", "f"):
-        assert f" {name}," in line or f" {name} hold" in line
-
-
 def test_actuator_through_its_dead_point(capsys, write):
     text = FOUR_BAR.format(ground=1.0, crank=0.4, coupler=1.0, rocker=0.8, start=1.0, end=5.0)
     text += '[actuators.ram]\npiston = ["ground.right", "crank.end"]\n[solve]\nunknown = "ram"\n'

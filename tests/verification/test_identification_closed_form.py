@@ -410,7 +410,7 @@ def test_bounds_of_factors_are_around_1_and_of_shares_from_0_to_1(text, taken):
         assert (found.low, found.high) == tuple(numbers[:2] or (0.0, 1.0))
         assert found.spread == (numbers[2] if len(numbers) > 2 else None)
     else:
-        with pytest.raises(ValueError, match="bounds|SPREAD|number"):
+        with pytest.raises(ValueError, match=r"bounds|SPREAD|number"):
             _parse(text)
 
 
