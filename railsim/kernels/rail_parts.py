@@ -144,6 +144,8 @@ def set_node_weights(rails, part, i, s, out, first):
     With u = (s - s_1)/h and the slopes m_1, m_2 at the cell's ends,
 
         f = (1 + 2u)(1 - u)^2 f_1 + u^2 (3 - 2u) f_2 + h u (1 - u)((1 - u) m_1 - u m_2).
+
+    The slope is 0 at both ends of a cell along which the rail keeps its section.
     """
     i_0, i_3 = neighbour_node(rails, part, i, 0), neighbour_node(rails, part, i, 3)
     x = rails.node_s
@@ -153,9 +155,10 @@ def set_node_weights(rails, part, i, s, out, first):
     out[first] = out[first + 3] = out[first + 4] = out[first + 7] = 0.0
     out[first + 1], out[first + 2] = (1.0 + 2.0 * u) * v * v, u * u * (3.0 - 2.0 * u)
     out[first + 5], out[first + 6] = -6.0 * u * v / h, 6.0 * u * v / h
+    level = have_same_tables(rails, i, i + 1)
     for end in range(2):
         outer, inner = (i_3, i + 1) if end else (i_0, i)
-        if outer != inner and have_same_tables(rails, outer, inner):
+        if level or (outer != inner and have_same_tables(rails, outer, inner)):
             continue
         # slope at this end: a (f_2 - f_1)/h + (1 - a) (f_1 - f_0)/h_0, and likewise
         turn = -h * u * u * v if end else h * u * v * v

@@ -470,6 +470,31 @@ def test_slope_of_a_rail_is_that_between_its_nodes_and_stays_where_it_ends(plain
     assert [fall(1, 1.5), fall(0, 3.1), fall(0, -0.1)] == [7.0] * 3
 
 
+@pytest.mark.parametrize("same", [None, 0, 2, 4])
+def test_tables_along_a_rail_are_joined_by_scipys_splines_of_the_slopes_at_their_nodes(same, plain):
+    """Uneven nodes, slopes of parabolas through three; level where two nodes have one table."""
+    random, n = np.random.default_rng(41), 6
+    s = np.cumsum(random.uniform(0.2, 1.5, n + 3))
+    zones, values = np.arange(3 * (n + 3)).reshape(-1, 3), random.normal(size=n + 3)
+    rails = Record(part=np.array([[0, 2], [2, n]]), node_s=s, node_zone=zones)
+    x, f = s[2 : 2 + n], values[2 : 2 + n]
+    slopes = np.gradient(f, x)
+    if same is not None:
+        zones[3 + same], f[same + 1] = zones[2 + same], f[same]
+        slopes = np.gradient(f, x)
+        slopes[[same, same + 1]] = 0.0
+    spline, weights = CubicHermiteSpline(x, f, slopes), np.zeros(20)
+    plain(rail_parts)
+    for at in np.linspace(x[0], x[-1], 25)[:-1]:
+        i = rail_parts.section_cell(rails, 1, at)
+        rail_parts.set_node_weights(rails, 1, i, at, weights, 9)
+        own = [values[rail_parts.neighbour_node(rails, 1, i, k)] for k in range(4)]
+        found = [weights[9:13] @ own, weights[13:17] @ own]
+        assert found == pytest.approx([float(spline(at)), float(spline(at, 1))], abs=1e-12)
+    assert rail_parts.section_cell(rails, 1, x[0] - 1e-9) < 0
+    assert rail_parts.section_cell(rails, 1, x[-1] + 1e-9) < 0
+
+
 def surface_of(values, y_0, dy):
     """Surface of a wheel, heights with their slopes at angles and widths, after another one."""
     n_phi, n_y, _ = values.shape
