@@ -345,10 +345,12 @@ def test_patches_are_damped_by_their_rates_and_stand_where_their_normals_meet_th
         assert row[A] / shape[A1] == pytest.approx((middle / row[B]) ** 0.39, rel=0.02)
 
 
+@pytest.mark.parametrize("down", [-1.5, 0.1, 1.5])
 @pytest.mark.parametrize("stepping", [(0, 0, 0), (0.02, 4, 0), (1e-3, 0, 2)])
-def test_the_change_of_a_contact_force_that_divides_steps(stepping, monkeypatch, plain):
+def test_the_change_of_a_contact_force_that_divides_steps(stepping, down, monkeypatch, plain):
     """Of each patch by itself: dV/dt at both rates, what a step of the horizon gains over it."""
     wheelset, damping = Wheelset("plain", monkeypatch, plain), 0.05
+    wheelset.rate[2] = wheelset.state[20] = down
     work, (horizon, lateral, sections) = wheelset.work, stepping
     wheelset.system.contact.damping = damping
     work.stepping[[HORIZON, LATERAL, SECTIONS]] = stepping
@@ -365,13 +367,23 @@ def test_the_change_of_a_contact_force_that_divides_steps(stepping, monkeypatch,
         change = changes[side, 1] - (-1.0, 1.0)[side] * aside
         speed, start = max(abs(p_rate), abs(p_rate + change)), max(p, 0.0)
         end = max(start, p + horizon * (p_rate + max(change, 0.0)))
-        load, more, gain = (k * x**1.5 + k2 * x**2 for x in (start, start + 1e-7, end))
-        rate = max(speed * (more - load) / 1e-7, (gain - load) / (horizon or np.inf))
+        load, gain = (k * x**1.5 + k2 * x**2 for x in (start, end))
+        slope = 1.5 * k * start**0.5 + 2.0 * k2 * start
+        rate = max(speed * slope, (gain - load) / (horizon or np.inf))
         if sections > 1:
             fades = np.minimum(1.0, np.array([start, end]) / 30e-6)
             rate += damping * speed * (fades[1] - fades[0]) / horizon
         rate = max(1e-3, rate * max(1.0, lateral * abs(g_y)))
-        assert work.force_rate[0] == pytest.approx(rate, rel=1e-2 if p < 1e-3 else 1e-4)
+        assert work.force_rate[0] == pytest.approx(rate, rel=1e-4)
+
+
+def test_a_wheel_with_nothing_near_is_a_metre_above_its_rail(monkeypatch, plain):
+    wheelset = Wheelset("plain", monkeypatch, plain)
+    wheelset.far[1] = True
+    assert wheelset.evaluate() == np.count_nonzero(DEPTHS[0, :3] > 0.0)
+    wheel = wheelset.work.wheel[0, 1]
+    assert (wheel[W_LIFT], wheel[W_Q], wheel[W_Y]) == (1.0, 0.0, 0.0)
+    assert wheelset.work.approach[:3] == pytest.approx([-1.0] * 3)
 
 
 def test_a_patch_comes_no_closer_than_a_steep_flange_does(plain):
