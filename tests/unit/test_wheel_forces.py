@@ -123,7 +123,8 @@ class Wheelset:
         self.system = Record(
             contact=Record(
                 body=np.ones(1, int), table=np.array([[0, 1]]), rails=rails, damping=0.0,
-                surface_of=np.zeros((0, 2)), values=np.full((2, 3, 1, 1, 1, 1), -9.0),
+                surface_of=np.full((int(self.sections), 2, 3), -1),
+                values=np.full((2, 3, 1, 1, 1, 1), -9.0),
                 shear=np.full(2, SHEAR), coupling=np.zeros((2, 2)),
             ),
             bodies=Record(kind=np.zeros(2), row=row),
@@ -321,8 +322,10 @@ def test_patches_are_damped_by_their_rates_and_stand_where_their_normals_meet_th
     kind, monkeypatch, plain
 ):
     wheelset = Wheelset(kind, monkeypatch, plain)
-    wheelset.system.contact.damping = damping = 0.05
+    wheelset.system.contact.damping = damping = 0.005
+    wheelset.rate[2] = wheelset.state[20] = 3.0  # all come closer
     n, work = wheelset.evaluate(), wheelset.work
+    assert n == np.count_nonzero(DEPTHS[:, : wheelset.count] > 0.0)
     rates, loads = rates_of(wheelset), force_of(wheelset.patches(wheelset.x))
     yaws = wheelset.x[4] - wheelset.slope @ [1.0, wheelset.x[0]]
     for (_, side, patch), row in zip(work.patch_index[:n], work.patch.T[:n], strict=True):
