@@ -7,7 +7,7 @@ import pytest
 from dynamics import rotation
 from scipy.optimize import approx_fprime
 
-from railsim.kernels import contact_table, wheel_contact
+from railsim.kernels import contact_table, table_ends, wheel_contact
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
@@ -24,6 +24,8 @@ from railsim.kernels.contact_columns import (
     FOOT_X_PER_YAW,
     FOOT_Y,
     FOOT_Z,
+    FORCE_PER_Z,
+    GEOMETRIC_STIFFNESS,
     MU_N,
     NORMAL,
     NORMAL_DAMPING,
@@ -40,6 +42,7 @@ from railsim.kernels.contact_columns import (
 from railsim.kernels.contact_table import (
     A1,
     B1,
+    BELOW_Y,
     C_Y,
     C_Z,
     D_B1,
@@ -52,6 +55,8 @@ from railsim.kernels.contact_table import (
     INSIDE,
     LOOK_UP_SIZE,
     MIDDLE_SHARE,
+    OUTSIDE_ROLL,
+    OUTSIDE_W,
     TAN_GAMMA,
     stretched_roll,
 )
@@ -75,6 +80,8 @@ from railsim.kernels.rails import (
     SLOPE_Z,
 )
 from railsim.kernels.state import SPEED
+from railsim.kernels.status import INWARD_RANGE, ROLL_RANGE, YAW_RANGE
+from railsim.kernels.support import SKIP, SUPPORT_STEP
 from railsim.kernels.system import HORIZON, LATERAL, SECTIONS, Z_0
 
 SHEAR, LEVER, EDGE, ROLL_END = 0.3, 0.7, 0.5, 0.02
@@ -424,3 +431,41 @@ def test_surfaces_that_are_not_round_bring_their_moments_rates_and_radii(monkeyp
     rate = np.array([rates[side, patch] for _, side, patch in work.patch_index[:n]]) + bump[B_RATE]
     cosine, fade = work.patch[ANGLE_COS, :n], np.minimum(1.0, p / 30e-6)
     assert damped == pytest.approx(np.maximum(0.0, V + 1e-3 * cosine**2 * fade * rate), rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_forces_on_elastic_rails_have_their_slopes_over_the_height(kind, monkeypatch, plain):
+    """Of patches that bend each other too; the contact angle turns by each gap's curvature."""
+    wheelset = Wheelset(kind, monkeypatch, plain)
+    work, system, step = wheelset.work, wheelset.system, 1e-7
+    system.support.elastic, system.contact.load = 1, np.full(1, 1e3)
+    system.contact.coupling[:] = 0.3, 0.2
+    work.support_step = np.zeros((1, SUPPORT_STEP))
+    monkeypatch.setattr(wheel_contact, "gap_curvature", lambda *a: 5.0 + a[2] + 10.0 * a[1])
+    loads, lean = [], rotation(work.plane[0, ROLL], 0)
+    for z in (step, -step, 0.0):
+        wheelset.state[7:9] = wheelset.x[1:3] + (lean @ [0.0, 0.0, z])[1:]
+        n = wheelset.evaluate()
+        loads.append(work.wheel[0, :, W_Q].copy())
+    side, patch = work.patch_index[:n, 1:].T
+    found = np.bincount(side, work.patch[FORCE_PER_Z, :n])
+    assert found == pytest.approx((loads[0] - loads[1]) / (2.0 * step), rel=1e-5)
+    if not wheelset.sections:
+        turned = -(work.patch[NORMAL] * work.patch[ANGLE_COS])[:n] * (5.0 + patch + 10.0 * side)
+        assert work.patch[GEOMETRIC_STIFFNESS, :n] == pytest.approx(turned)
+    work.support_step[0, SKIP], before = 1.0, work.rail_force.copy()
+    assert wheelset.evaluate() == 0  # its forces stay
+    assert (work.rail_force == before).all()
+
+
+@pytest.mark.parametrize("kind", ["plain", "section"])
+@pytest.mark.parametrize(
+    ("code", "status"),
+    [(BELOW_Y, INWARD_RANGE), (OUTSIDE_ROLL, ROLL_RANGE), (OUTSIDE_W, YAW_RANGE)],
+)
+def test_a_wheel_outside_its_table_ends_the_run(code, status, kind, monkeypatch, plain):
+    plain(table_ends)
+    wheelset = Wheelset(kind, monkeypatch, plain)
+    monkeypatch.setattr(wheel_contact, "find_cell", lambda *_: (code, 0, 0, 0, 0.0, 0.0, 0.0))
+    found = wheel_contact.add_normal_contact(wheelset.system, wheelset.work, 2.0, wheelset.state)
+    assert found == (status, 0, 0)
