@@ -86,6 +86,8 @@ from railsim.kernels.support import (
     C_BALLAST_Z,
     C_PAD_Y,
     C_PAD_Z,
+    D_Y_SLIP,
+    D_Z_SLIP,
     DOF,
     ERROR_Y,
     ERROR_Z,
@@ -100,6 +102,7 @@ from railsim.kernels.support import (
     K_BALLAST_Z,
     K_PAD_Y,
     K_PAD_Z,
+    L_MOTION,
     L_PATCHES,
     L_Y_Y,
     L_Z_Y,
@@ -662,3 +665,34 @@ def test_tracks_accelerate_by_what_is_left_of_their_forces(about, plain):
     assert not found[:, kept:DOF].any()
     assert not found[:, RATE + kept : RATE + DOF].any()
     assert about.get("elastic", 1) or not found.any()
+
+
+@pytest.mark.parametrize("massless", [0, 1])
+def test_a_step_of_the_tracks_balances_its_forces_where_it_ends(massless, plain):
+    """M u'' + C u' + K u = F + K_c (dq - du) + D (dq' - du') + slip, by the state after it."""
+    system, work, state, tracks = tracks_under_two_wheelsets(35, plain, massless=massless)
+    system.support.row[[M_RAIL, M_SLEEPER, I_SLEEPER]] *= 1 - massless
+    random, h, last = np.random.default_rng(36), 2e-2, 3e-2
+    work.support_step[:, PENDING] = 0.0
+    wheels, change = support_step.paired_numbers(0, 2), random.normal(size=(7, LANES))
+    change[:, 4:] = np.tile(change[:, 2:4], 2)
+    begin, before = support.support_begin(system), tracks.copy()
+    lms = [begin + SUPPORT_SIZE * w + LMS + LMS_SIZE * k for w in (0, 1) for k in (0, 1)]
+    support_step.step_tracks(system, work, state, wheels, lms + 2 * lms[2:], change, h, last)
+    assert tracks[:, STEP_RATIO] == pytest.approx(h / (h + last))
+    for w, (old, new) in enumerate(zip(before, tracks, strict=True)):
+        M, C, K_ = matrices(system.support.row, *work.support_step[w, [PADS, BALLAST]])
+        u, rate, acceleration = (new[k : k + DOF] for k in (0, RATE, ACCELERATION))
+        moved, faster = u - old[:DOF], rate - old[RATE : RATE + DOF]
+        load = np.zeros(DOF)
+        for side in range(2):
+            contact, at = work.support[w, side], [2 * side, 2 * side + 1]
+            own = [contact[k : k + 6].reshape(2, 3) for k in (support.K, support.D)]
+            y, z, roll, *rates, slip = change[:, 2 * w + side]
+            load[at] = contact[[F_Y, F_Z]] + contact[[D_Y_SLIP, D_Z_SLIP]] * slip
+            load[at] += own[0] @ [y - moved[at[0]], z - moved[at[1]], roll]
+            load[at] += own[1] @ [rates[0] - faster[at[0]], rates[1] - faster[at[1]], rates[2]]
+            learnt = new[LMS + LMS_SIZE * side + L_MOTION]
+            assert learnt == pytest.approx(y - moved[at[0]])
+        found = M @ acceleration + C @ rate + K_ @ u
+        assert found == pytest.approx(load, abs=1e-9)
