@@ -66,7 +66,7 @@ MIDDLE_SHARE = LOADS[1] / (LOADS[1] + HALF_LOAD)
 MAX_ITERATIONS = 30  # of `couple_approaches`; some four are needed
 # Relative change of the approaches below which they have converged: Newton squares it once more.
 TOLERANCE = 1e-8
-MAX_W = 2.0  # over the last node of w: as far is the table continued
+MAX_W = 2.5  # over the last node of w: as far is the table continued
 # Least share of the last node's stiffness and width that a continued patch keeps; root of the
 # penetration at which stiffness is judged beside that at none [m^0.5].
 MIN_SHARE, ROOT_DEPTH = 0.5, 0.01
