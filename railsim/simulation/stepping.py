@@ -61,9 +61,7 @@ class Simulation:
     allow_code : bool
         Execute the user-defined laws that the files name, see `railsim.laws`.
 
-    Raises
-    ------
-    InputError, ModelError : as `railsim.simulate`.
+    Raises InputError, ModelError as `railsim.simulate`.
 
     Examples
     --------

@@ -100,19 +100,13 @@ def critical_speed(
         in the shape of the hunting mode [m].
     over_amplitude : bool
         Find the linear critical speed over amplitude and on rigid rails too, 10 to 20 s of CPU.
-    settings : Settings, optional
-        Scheme, creep law, contact.
-    profiles : mapping of str to Profile, optional
-        Profiles that take precedence over built-in ones and files.
-    progress : callable, optional
-        Called repeatedly with the finished fraction.
+    settings, profiles, progress : optional
+        As in `railsim.simulate`.
 
     Raises
     ------
-    InputError
-        An argument is out of range.
-    ModelError
-        There is no equilibrium, or no stable step.
+    InputError : an argument is out of range.
+    ModelError : there is no equilibrium, or no stable step.
     """
     methods = [methods] if isinstance(methods, str) else methods
     excitations = np.ravel(excitations).tolist()

@@ -169,7 +169,7 @@ def test_without_branches_the_title_says_the_linear_critical_speed():
         return plots.bifurcation_figure(found(**given)).get_suptitle().splitlines()
 
     assert title()[0] == "coach"
-    assert title()[1] == "straight track, rails 60E1, friction 0.4, polach"
+    assert title()[1] == "straight track, rails 60E1, friction 0.4, linear"
     assert title()[-1] == "no linear critical speed from 5 to 90 m/s"
     assert title(unstable_at_low=True)[-1] == "unstable at 5 m/s, the lower end of the range"
     lost = title(linear=LinearLoss(61.0, 1.0, "hunting"))
