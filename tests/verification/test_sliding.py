@@ -107,9 +107,9 @@ def test_one_way_to_the_twist_is_the_first_branch_of_the_loop():
 
 
 def test_slow_run_over_ramps_leaves_what_the_loop_leaves():
-    """1 m/s over 3 permille up and down: share of the twist in the loads, 0.015 of Q0.
+    """1 m/s over 3 permille up and down: share of the twist in the loads, 0.012 of Q0.
 
-    The run also sways and lifts the body; what is shaken holds less: up to 0.012 less measured.
+    The run also sways and lifts the body; what is shaken holds less: up to 0.009 less measured.
     """
     wagon, ramp, level, slope = load_vehicle("wagon_uic_link"), 24.0, 16.0, 3e-3
     cant = [
@@ -128,6 +128,6 @@ def test_slow_run_over_ramps_leaves_what_the_loop_leaves():
     ends = np.isin(loop.share, (-1.0, 0.0, 1.0))
     places = [20.0 + k for k in (0.5 * ramp, ramp + 0.5 * level, 1.5 * ramp + level, 84.0)]
     found = [twisted(run["Q"][np.argmin(np.abs(run["distance"] - s))]) for s in places]
-    assert found == pytest.approx(twisted(loop.Q[ends])[:4].tolist(), abs=0.015)
+    assert found == pytest.approx(twisted(loop.Q[ends])[:4].tolist(), abs=0.012)
     assert found[1] < -0.04
     assert found[3] > 0.04
