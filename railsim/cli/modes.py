@@ -19,12 +19,13 @@ if TYPE_CHECKING:
 FILES = ("modes.json", "modes.png")
 ANIMATION, ALL = "mode.html", "modes.html"
 CYCLE = {"frames": 40, "cycles": 1}
+SPEED = 20.0  # m/s, unless one or several are given
 
 
 @click.command()
 @cli.vehicle_argument
 @cli.optional_track
-@cli.option("--speed", "Speed in m/s, or with a unit: 72km/h; default 20.", "V", cli.as_speed)
+@cli.option("--speed", f"In m/s, or with a unit: 72km/h; default {SPEED:g}.", "V", cli.as_speed)
 @cli.values("--speeds", "N speeds from A to B: a root locus.", "A:B:N")
 @cli.option("--over", "Root locus over a key of the input at --speed.", "KEY.PATH=A:B:N")
 @cli.flag("--held", "Hold the wheelsets.")
@@ -64,7 +65,7 @@ def command(
     if speeds is not None and (over is not None or speed is not None):
         option = "--speed" if over is None else "--over"
         raise input_error(option, "given together with --speeds", "one of the two")
-    speed = 20.0 if speed is None else speed
+    speed = SPEED if speed is None else speed
     cli.goes_with("--linearisation harmonic", how["linearisation"] == "harmonic", "amplitude")
     coach, rails, settings = given.inputs()
     if animate is not None and (output.out is None or speeds is not None or over is not None):

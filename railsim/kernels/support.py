@@ -216,6 +216,8 @@ def contact_force(matrix, y, z, roll):
 def solve_track(support, factors, K, D, b, m, c, k):
     """Solve (m M + c (C + D) + k (K + K_c)) x = b for the tracks of four wheelsets.
 
+    Of K_c the derivative of Y over y is limited, see `MAX_RELIEF`.
+
     The rails are eliminated side by side; what is left is 3 by 3, worked out in both lanes of a
     wheelset.
 
